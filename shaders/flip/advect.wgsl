@@ -1,19 +1,15 @@
-// Advects particles with the projected velocity at their positions, which is that of the middle of
-// the substep, and by the density correction's displacement. Particles are kept out of solids and
-// walls, and lose their velocity component into them. A particle that would move farther than the
-// cap is slowed and counted.
-// The velocity farther along the path is not that of the water when it gets there: the flow moves
-// along with it. A midpoint rule in the field of the substep's start makes waves on a current grow.
+// Advects particles with the projected velocity by the midpoint rule (grid_to_particle has sampled
+// the first stage), and by the density correction's displacement. Particles are kept out of solids
+// and walls, and lose their velocity component into them. A particle that would move farther than
+// the cap is slowed and counted.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/flip_params.wgsl"
+#import "shared/flip_velocity.wgsl"
 #import "shared/finite.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
-#endif
-#ifdef PERIODIC
-#import "shared/flip_periodic.wgsl"
 #endif
 
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
@@ -57,7 +53,12 @@ fn main(
         return;
     }
     let start = three(sorted_position[i]);
-    var way = params.time_step * three(carried[i]);
+    let here = three(carried[i]);
+    // A droplet continues ballistically: along its path the faces do not carry its velocity, and
+    // those around may belong to other water.
+    let is_drop = sorted_velocity[3u * params.particle_count + i] > 0.0;
+    let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop);
+    var way = params.time_step * between;
 #ifdef CORRECTION
     way += three(carried[params.particle_count + i]);
 #endif

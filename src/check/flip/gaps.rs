@@ -1,9 +1,6 @@
-//! Gaps that close within the substep, and water that contracts on straight paths.
+//! Gaps that close within the substep.
 
-use swell_reference::flip::{
-    OpenSpace, Unprojected, WHOLE, close_gaps as reference_close_gaps,
-    find_contraction as reference_find_contraction,
-};
+use swell_reference::flip::{Gaps, OpenSpace, close_gaps as reference_close_gaps};
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
 
@@ -17,13 +14,13 @@ use crate::{
 pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, step, space) = (state.elements(), state.step(), state.space());
     let faces = elements.faces(&io.before)?;
-    let gaps = Unprojected {
+    let gaps = Gaps {
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,
         space,
         density: state.density(),
-        faces: &faces,
+        velocity: &faces.velocity,
     };
     let has_distance = state.model.settings().surface == Surface::GhostFluid;
     let mut distance = match has_distance {
@@ -72,49 +69,5 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         solid_flux: flux,
         ..reference
     });
-    Ok(())
-}
-
-/// Compares the pass, from the kinds, densities, velocities and fluxes on the device.
-pub(super) fn find_contraction(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
-    let (elements, step, space) = (state.elements(), state.step(), state.space());
-    let faces = elements.faces(&io.before)?;
-    let water = Unprojected {
-        model: &state.model,
-        step: &step,
-        bricks: &elements.bricks,
-        space,
-        density: state.density(),
-        faces: &faces,
-    };
-    let contraction = reference_find_contraction(&water);
-    let before = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
-    let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
-    let cut = CUT.of([state.place()]);
-    let rate = step.length / state.model.cell_size();
-    io.table.each(&CONTRACTION, elements.active(), |e| {
-        let near_whole = |e: usize| f64::from((space.volume[e] - WHOLE).abs() <= cut);
-        let is_tie = elements.largest_about(e, near_whole) > 0.0;
-        let minors: f64 = match water.strains(e as u32) {
-            true => water.minors(e as u32).iter().map(|minor| minor.1).sum(),
-            false => 0.0,
-        };
-        let exact = before[e] - contraction[e];
-        let sizes = [rate, minors, before[e].abs().max(exact.abs())];
-        (!is_tie).then(|| pair(e, flux[e], exact, sizes))
-    });
-    let mut alone = Vec::new();
-    if state.scene.is_worked_on() {
-        alone = elements.scalars(&io.after, buffers::contraction(elements.stride))?;
-        io.table.each(&CONTRACTION_ALONE, elements.active(), |e| {
-            let sizes = [flux[e].abs().max(before[e].abs())];
-            pair(e, alone[e], flux[e] - before[e], sizes)
-        });
-    }
-    state.space = Some(OpenSpace {
-        solid_flux: flux,
-        ..space.clone()
-    });
-    state.contraction = alone;
     Ok(())
 }

@@ -185,11 +185,15 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(given) = state.given.take() else {
         return Ok(());
     };
-    let n = state.n;
+    let (n, elements) = (state.n, state.elements());
+    let faces = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
     let (step, start) = (state.step(), &state.sorted().cloud.position);
-    let go = |start: &[DVec3]| reference_advect(&state.model, &step, start, &given);
+    let go = |start: &[DVec3]| {
+        let (model, bricks) = (&state.model, &elements.bricks);
+        reference_advect(model, &step, bricks, start, &faces, &given)
+    };
     let reference = go(start);
-    let fastest = given.carried.iter().map(|v| v.length()).fold(0.0, f64::max);
+    let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
     let grid = state.distance_error();
     let reach = |x: &DVec3| START.of([x.length(), step.length, fastest, grid]);
     let answers: Vec<Moved> = DVec3::AXES

@@ -53,7 +53,7 @@ bounds! {
         most: "the largest of them"]
         9.0 * place * range + 96.0 * U * most,
         "along each axis; three sums over 18 faces, and their quotient";
-    pub(super) START = [x: "|x|", step: "Δt", fastest: "the largest |v|", grid: "with solids " GRID]
+    pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
         U * (8.0 * x + 30.0 * step * fastest) + grid, "";
 
     pub(super) OF_DIFFERENCE = [unit: "U, or 2⁻⁵³ with f64",
@@ -190,14 +190,6 @@ entries! {
             4.0 * U * size + (7.0 * flow + 48.0) * U * change,
             "a cell, a copy, or a mix of both: 4 operations, a sum of 7 products, and at most \
              twice its quotient (5 u) by a length (16 u) of a rounded velocity (1 u)", tie OF_GAP;
-    }
-    "flip/find_contraction" {
-        CONTRACTION = "flux with contraction", "m/s": [rate: "Δt / Δx",
-            minors: "Σ|products of slopes|", flux: "its own value, or that before"]
-            24.0 * U * rate * minors + 2.0 * U * flux,
-            "15 products of differences or of sums of two, and their sum", tie CUT;
-        CONTRACTION_ALONE = "contraction alone", "m/s": [flux: "with or without it"]
-            2.0 * U * flux, "a sum";
     }
     "flip/find_excess" {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT]

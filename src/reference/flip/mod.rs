@@ -6,7 +6,6 @@
 //! splits a pass for speed, one function covers both halves. [`Flip`] runs whole frames.
 
 mod bodies;
-mod contraction;
 mod deep;
 pub mod effects;
 mod forces;
@@ -27,10 +26,9 @@ mod wall_friction;
 mod water;
 
 pub use bodies::{BodyCells, carry_bodies, couple_bodies};
-pub use contraction::{WHOLE, find_contraction};
 pub use deep::{DeepCells, Motion, carry_deep, fill_deep, place_deep};
 pub use forces::{push_drops, push_faces, work_by_cells};
-pub use gaps::{Unprojected, close_gaps};
+pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;
 pub use model::{FlipSubstep, Model};
 pub use pressure::{Waters, density_source};

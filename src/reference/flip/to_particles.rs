@@ -460,20 +460,28 @@ pub fn push_apart(
     parallel::map(0..sorted.cell.len(), one)
 }
 
-/// Advects particles by the grid's velocity at their positions and the density correction's
-/// displacement, keeps them out of solids and walls, and removes their velocity component into
-/// these. A particle that would move farther than the cap is slowed.
+/// Advects particles by the midpoint rule and the density correction's displacement, keeps them out
+/// of solids and walls, and removes their velocity component into these. A particle that would move
+/// farther than the cap is slowed.
 pub fn advect(
     model: &Model,
     step: &FlipSubstep<'_>,
+    bricks: &Bricks,
     position: &[DVec3],
+    velocity: &[DVec3],
     given: &GridTransfer,
 ) -> Moved {
     let contact = model.contact_distance();
     let (low, high) = (step.walls.min + contact, step.walls.max - contact);
     let one = |i: usize| {
-        let start = position[i];
-        let mut way = step.length * given.carried[i] + given.displacement[i];
+        let (start, here) = (position[i], given.carried[i]);
+        let middle = start + 0.5 * step.length * here;
+        // A droplet continues ballistically: faces along its path may belong to other water.
+        let between = match given.is_drop[i] {
+            true => here,
+            false => velocity_at(model, bricks, velocity, middle, here),
+        };
+        let mut way = step.length * between + given.displacement[i];
         let distance = way.length();
         let is_capped = distance > model.max_displacement();
         if is_capped {

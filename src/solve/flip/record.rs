@@ -9,7 +9,7 @@ use crate::{
     pressure::bodies,
     trace::Run,
 };
-use swell_domain::{bricks::CELLS, flip::LAYERS as FACE_LAYERS};
+use swell_domain::{bricks::CELLS, flip::layers};
 use swell_gpu::{
     buffer::Workgroups,
     program::Program,
@@ -19,6 +19,9 @@ use swell_gpu::{
 use swell_scene::FlipScene;
 
 use super::{buffers::*, plan::pushes};
+
+/// Index in [`GROUPS`] of the dispatch over the first extrapolated layer; further layers follow.
+pub(super) const FIRST_LAYER: usize = 2;
 
 /// Particles per thread of `flip/survey`; its `RUN`.
 const SURVEY_RUN: usize = 16;
@@ -42,8 +45,6 @@ pub(super) struct Recordings {
     pub(super) carry: Option<Recording>,
     /// Between two projections: the first iteration, and a further one.
     between: [Recording; 2],
-    /// Before the density correction, if anything precedes it.
-    pub(super) before_correction: Option<Recording>,
     /// Transfers from the projected grid to particles.
     pub(super) to_particles: Recording,
     /// Checks and sums that the host reads after the substep.
@@ -57,8 +58,6 @@ impl Recordings {
             to_grid: Recording::new(program, &commands.to_grid),
             carry: (!commands.carry.is_empty()).then(|| Recording::new(program, &commands.carry)),
             between: [&commands.begin, &commands.again].map(|part| Recording::new(program, part)),
-            before_correction: (!commands.before_correction.is_empty())
-                .then(|| Recording::new(program, &commands.before_correction)),
             to_particles: Recording::new(program, &commands.to_particles),
             watch: Recording::new(program, &commands.watch),
         }
@@ -92,7 +91,6 @@ pub(super) struct Commands {
     carry: Vec<Command>,
     begin: Vec<Command>,
     again: Vec<Command>,
-    before_correction: Vec<Command>,
     to_particles: Vec<Command>,
     watch: Vec<Command>,
 }
@@ -124,7 +122,6 @@ impl Commands {
             again: between()
                 .flat_map(|between| between.again.clone())
                 .collect(),
-            before_correction: before_correction(plan, scene),
             to_particles: end,
             watch: watch(plan, scene),
         }
@@ -139,15 +136,28 @@ impl Commands {
     }
 
     pub(super) fn after_projection(&self) -> impl Iterator<Item = &Command> {
-        let parts = [&self.before_correction, &self.to_particles, &self.watch];
-        parts.into_iter().flatten()
+        self.to_particles.iter().chain(&self.watch)
     }
 }
 
-/// Returns the contents of `groups`: of passes over [`WET`] and over [`ACTIVE`] cells.
-pub(super) fn groups(program: &Program, params: &FlipParams) -> [Workgroups; 2] {
-    [params.wet_cells, params.active_cells]
-        .map(|cells| spread(&program.context, WORKGROUP, u64::from(cells)).into())
+/// Returns the contents of `groups`. Layers beyond those that the substep needs get empty
+/// dispatches.
+pub(super) fn groups(
+    program: &Program,
+    scene: &FlipScene,
+    params: &FlipParams,
+    needed: usize,
+) -> Vec<Workgroups> {
+    let of = |cells: u32| spread(&program.context, WORKGROUP, u64::from(cells)).into();
+    let mut all = vec![of(params.wet_cells), of(params.active_cells)];
+    // The projection itself provides layer 1.
+    all.resize(
+        FIRST_LAYER + needed.saturating_sub(1),
+        of(params.active_cells),
+    );
+    let planned = FIRST_LAYER + layers(scene.settings().cfl);
+    all.resize(all.len().max(planned), Workgroups::default());
+    all
 }
 
 /// Returns `count` windows that contain consecutive numbers from `first` on.
@@ -197,9 +207,6 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
     commands.push(over("flip/close_gaps", WET));
-    if contracts(plan, scene) {
-        commands.push(over("flip/find_contraction", ACTIVE));
-    }
     if scene.settings().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }
@@ -229,19 +236,6 @@ fn carry(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     scene.has_bodies().then(pass).into_iter().collect()
 }
 
-/// Returns whether the projection makes up for the contraction of straight paths: those of FLIP's
-/// particles, in a domain that does not turn. (There Coriolis's acceleration would turn what flows
-/// in.)
-pub(super) fn contracts(plan: &Plan, scene: &FlipScene) -> bool {
-    plan.moves && !scene.turns_velocities()
-}
-
-fn before_correction(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
-    let corrects = scene.settings().density_correction && contracts(plan, scene);
-    let pass = || over("flip/predict_excess", ACTIVE);
-    corrects.then(pass).into_iter().collect()
-}
-
 fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let look = |PlannedBuffer { spec, .. }: &PlannedBuffer| Command::Dispatch {
         pass: "flip/find_not_finite",
@@ -267,10 +261,9 @@ fn to_particles(
 ) -> Vec<Command> {
     let flip = scene.settings();
     let mut commands = vec![over("flip/find_change", ACTIVE)];
-    // The projection itself provides layer 1.
-    for k in 0..FACE_LAYERS - 1 {
+    for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];
-        commands.push(over_listed("flip/extrapolate", ACTIVE, binds));
+        commands.push(over_listed("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     if flip.band.is_some() {
         commands.push(over("flip/carry_deep", WET));
