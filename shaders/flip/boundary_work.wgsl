@@ -1,7 +1,6 @@
 // Work by moving walls and solids on the water in a substep, over Δx² Δt, per workgroup: −p times
 // the flux that they push through the closed parts of a cell's faces. It equals their contribution
-// to the energy in the projection. The fluxes of closing gaps (flip/close_gaps) and of contraction
-// (flip/find_contraction) are not work.
+// to the energy in the projection. The flux of closing gaps (flip/close_gaps) is not work.
 #import "shared/thread.wgsl"
 #import "shared/sum_of_group.wgsl"
 #import "shared/flip_cell.wgsl"
@@ -24,11 +23,7 @@ fn main(
     let element = select(0u, thread + CELLS, is_inside);
     let is_thin = density[element] < 0.5 && !is_buried(element, vec3f(own_cell(element)));
     let is_water = cell_kind[element] == 1u && !is_thin;
-    var flux = solid_flux[element];
-#ifdef CONTRACTION
-    flux -= solid_flux[params.stride + element];
-#endif
-    let work = select(0.0, -pressure[element] * flux, is_water && is_inside);
+    let work = select(0.0, -pressure[element] * solid_flux[element], is_water && is_inside);
     let sum = sum_of_group(local, work);
     if local == 0u && is_inside {
         boundary_work[thread / 64u] = sum;

@@ -64,9 +64,12 @@ pub const VON_KARMAN: f64 = 0.41;
 /// accelerates beyond it are slowed and counted.
 pub const CAP: f64 = 2.0;
 
-/// Layers of faces with a velocity, outward from the water: those of the projection, and as far as
-/// particles in a cell at an edge of a cell of water read faces.
-pub const LAYERS: usize = 5;
+/// Returns how many layers of faces a velocity is extrapolated outward for particles that move by
+/// `displacement` cells: √3 times as many along a diagonal, plus those that trilinear samples at
+/// both stages of the midpoint rule read.
+pub fn layers(displacement: f64) -> usize {
+    (3f64.sqrt() * displacement).ceil() as usize + 3
+}
 
 /// Returns the cells stored along each axis: one beyond the domain's own, for its upper faces; none
 /// along periodic axes, where these are the lower faces of the first cells.

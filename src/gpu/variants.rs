@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 97] = [
+const VARIANTS: [&[&str]; 96] = [
     &[],
     &["SOLIDS"],
     &["BAND"],
@@ -40,16 +40,7 @@ const VARIANTS: [&[&str]; 97] = [
         "PUSHED",
         "GHOST_FLUID",
     ],
-    &["CONTRACTS", "CONTRACTION"],
-    &[
-        "SOLIDS",
-        "MOVING_SOLIDS",
-        "SHAPES",
-        "BODIES",
-        "APIC",
-        "CONTRACTS",
-        "CONTRACTION",
-    ],
+    &["SOLIDS", "MOVING_SOLIDS", "SHAPES", "BODIES", "APIC"],
     &[
         "PAGED",
         "PROJECTED",

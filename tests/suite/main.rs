@@ -111,7 +111,6 @@ mod solve {
     mod apic_solids;
     mod band;
     mod bodies;
-    mod current;
     mod drag;
     mod flip;
     mod flip_passes;

@@ -523,6 +523,9 @@ pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> PassResult 
 pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let layer = io.before.window(&buffers::LAYERS)?[0];
     let (elements, step) = (state.elements(), state.step());
+    if layer > step.layers as u32 {
+        return Ok(());
+    }
     let before = elements.faces(&io.before)?;
     let mut reference = before.clone();
     reference_extrapolate(&step, &elements.bricks, layer, &mut reference);

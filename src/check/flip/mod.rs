@@ -52,11 +52,6 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
         || names![buffers::LIQUID_DISTANCE],
         gaps::close_gaps,
     ),
-    comparison(
-        "flip/find_contraction",
-        || names![buffers::SOLID_FLUX],
-        gaps::find_contraction,
-    ),
     comparison("flip/find_excess", NONE, grid::find_excess),
     comparison(
         "flip/let_in",
@@ -68,7 +63,6 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
         elements::faces_kept,
         grid::wall_friction,
     ),
-    comparison("flip/bend_paths", elements::faces_kept, gaps::bend_paths),
     comparison("flip/find_change", elements::faces_kept, grid::find_change),
     comparison("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     comparison("flip/carry_deep", NONE, deep::carry_deep),
@@ -124,10 +118,6 @@ pub(crate) struct FlipState {
     space: Option<OpenSpace>,
     /// Densities at cell centres, as on the device.
     density: Option<Vec<f64>>,
-    /// Fluxes of contraction, as on the device; empty where boundaries do no work.
-    contraction: Vec<f64>,
-    /// Part of the midpoint rule in the cells' paths, as on the device; empty where it serves all.
-    bend: Vec<f64>,
     assembled: Option<Assembled>,
     given: Option<GridTransfer>,
     /// Number of runs of each pass of an iteration on each level.
@@ -177,8 +167,6 @@ impl FlipState {
             sorted: None,
             space: None,
             density: None,
-            contraction: Vec::new(),
-            bend: Vec::new(),
             assembled: None,
             given: None,
             runs: BTreeMap::new(),
@@ -246,9 +234,7 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let wet = elements.wet();
     let sums = io.after.get(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {
-        FLUID if !is_filling(e) => {
-            -pressure[e] * (flux[e] - state.contraction.get(e).unwrap_or(&0.0))
-        }
+        FLUID if !is_filling(e) => -pressure[e] * flux[e],
         _ => 0.0,
     };
     io.table.each(&WORK, 0..sums.len(), |group| {

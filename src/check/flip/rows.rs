@@ -191,14 +191,6 @@ entries! {
             "a cell, a copy, or a mix of both: 4 operations, a sum of 7 products, and at most \
              twice its quotient (5 u) by a length (16 u) of a rounded velocity (1 u)", tie OF_GAP;
     }
-    "flip/find_contraction" {
-        CONTRACTION = "flux with contraction", "m/s": [rate: "Δt / Δx",
-            minors: "Σ|products of slopes|", flux: "its own value, or that before"]
-            80.0 * U * rate * minors + 2.0 * U * flux,
-            "15 products of differences or of sums of two, their sum, and a part that falls with it", tie CUT;
-        CONTRACTION_ALONE = "contraction alone", "m/s": [flux: "with or without it"]
-            2.0 * U * flux, "a sum";
-    }
     "flip/find_excess" {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT]
             4.0 * U * excess + cut * excess, "a difference, and the product with the open volume";
@@ -394,11 +386,6 @@ entries! {
     "flip/boundary_work" {
         WORK = "shares of the work", "W/m²": [sizes: "Σ|p f|"]
             66.0 * U * sizes, "64 products and sums";
-    }
-    "flip/bend_paths" {
-        BEND = "part of the midpoint rule", "": [part: "(Δt / Δx)² over what bends paths",
-            after: "Σ|products of slopes| after the projection", before: "before it"]
-            U * (part * (24.0 * after + 80.0 * before) + 8.0), "as of the contraction", tie CUT;
     }
     "flip/find_change" {
         CHANGE = "change at faces", "m/s": [size: "|v| + |v before|"] U * size, "one difference";

@@ -11,7 +11,7 @@ use swell_domain::{
     boundary::Boundary,
     bounds::Bounds,
     bricks::{Bricks, EDGE, table_dims},
-    flip::{CAP, CONTACT, LAYERS, stored_cells},
+    flip::{CAP, CONTACT, layers, stored_cells},
     period::Period,
     pose::{Passage, Pose},
     shape::ShapeField,
@@ -63,6 +63,8 @@ pub struct FlipSubstep<'a> {
     pub wall_velocity: [DVec3; 2],
     /// PIC fraction α of the substep.
     pub pic_blend: f64,
+    /// Number of layers of faces that get a velocity.
+    pub layers: usize,
     /// Solids in their poses at the substep's start.
     pub solids: Vec<Solid<'a>>,
 }
@@ -148,7 +150,7 @@ impl Model {
     }
 
     /// Lays out the bricks with particles (`is_wet`), those that count as water near walls and
-    /// solids, and those within reach of the layers of faces. The elements are those of the
+    /// solids, and those within reach of the step's layers of faces. The elements are those of the
     /// GPU.
     pub fn bricks(&self, is_wet: &[bool], step: &FlipSubstep<'_>) -> Bricks {
         self.laden_bricks(is_wet, None, step)
@@ -163,7 +165,7 @@ impl Model {
     ) -> Bricks {
         let periodic = self.scene.periodic;
         let cells = stored_cells(self.cells, periodic);
-        let reach = (LAYERS as u32).div_ceil(EDGE);
+        let reach = (step.layers as u32).div_ceil(EDGE);
         let mut is_wet = is_wet.to_vec();
         let moving = step.solids.iter().zip(&self.solids).skip(self.at_rest);
         let size = self.cell_size();
@@ -206,6 +208,7 @@ impl Model {
                 (after.max - before.max) / length,
             ],
             pic_blend: self.scene.substep_pic_blend(length),
+            layers: layers(substep.displacement),
             solids: self.solids_at(bodies, start, length),
         }
     }

@@ -460,45 +460,26 @@ pub fn push_apart(
     parallel::map(0..sorted.cell.len(), one)
 }
 
-/// The field that particles go by, and where they do not go straight on.
-#[derive(Clone, Copy)]
-pub struct Paths<'a> {
-    /// Layout of the elements.
-    pub bricks: &'a Bricks,
-    /// Velocities at the lower faces, m/s.
-    pub velocity: &'a [DVec3],
-    /// Element of each particle's cell.
-    pub cell: &'a [u32],
-    /// From [`super::bend_paths`]; everywhere 1 if empty.
-    pub bend: &'a [f64],
-}
-
-/// Advects particles by the grid's velocity at their positions, or, where paths are bent, by the
-/// midpoint rule, and by the density correction's displacement; keeps them out of solids and walls,
-/// and removes their velocity component into these. A particle that would move farther than the cap
-/// is slowed.
+/// Advects particles by the midpoint rule and the density correction's displacement, keeps them out
+/// of solids and walls, and removes their velocity component into these. A particle that would move
+/// farther than the cap is slowed.
 pub fn advect(
     model: &Model,
     step: &FlipSubstep<'_>,
-    paths: &Paths<'_>,
+    bricks: &Bricks,
     position: &[DVec3],
+    velocity: &[DVec3],
     given: &GridTransfer,
 ) -> Moved {
     let contact = model.contact_distance();
     let (low, high) = (step.walls.min + contact, step.walls.max - contact);
     let one = |i: usize| {
         let (start, here) = (position[i], given.carried[i]);
-        let bend = paths.bend.get(paths.cell[i] as usize).unwrap_or(&1.0);
+        let middle = start + 0.5 * step.length * here;
         // A droplet continues ballistically: faces along its path may belong to other water.
         let between = match given.is_drop[i] {
             true => here,
-            false => {
-                let middle = start + 0.5 * step.length * here;
-                here.lerp(
-                    velocity_at(model, paths.bricks, paths.velocity, middle, here),
-                    *bend,
-                )
-            }
+            false => velocity_at(model, bricks, velocity, middle, here),
         };
         let mut way = step.length * between + given.displacement[i];
         let distance = way.length();

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{
     BodyCells, Centers, Cloud, Faces, FlipSubstep, GridTransfer, Model, OpenSpace, Sorted,
-    find_buried, is_filling, projection::Projected,
+    is_filling, projection::Projected,
 };
 use swell_domain::{body::BodyState, bricks::Bricks, solver::Projection};
 
@@ -31,11 +31,8 @@ pub struct Trace {
     pub is_short: bool,
     /// Pressure by element, Pa; 0 where there is no water.
     pub pressure: Vec<f64>,
-    /// Σ ± (1 − f) u_solid of each cell after the projections, less `contraction`, m/s.
+    /// Σ ± (1 − f) u_solid of each cell after the projections, m/s.
     pub solid_flux: Vec<f64>,
-    /// Flux that makes up for each cell's contraction (flip/find_contraction), m/s; empty if
-    /// another solver moves the particles.
-    pub contraction: Vec<f64>,
     /// Work of the scene's forces, joules.
     pub force_work: f64,
     /// Cells that bodies touch.
@@ -68,32 +65,6 @@ impl Trace {
     }
 }
 
-/// A pressure field on cells.
-pub(super) struct PressureField {
-    pub(super) bricks: Bricks,
-    pub(super) kind: Vec<u32>,
-    /// Whether each cell's centre is inside a wall or solid.
-    pub(super) is_buried: Vec<bool>,
-    /// Pressure by element, Pa.
-    pub(super) pressure: Vec<f64>,
-    /// See [`swell_domain::gauge::Gauge::taken`].
-    pub(super) taken: Vec<[f32; 3]>,
-}
-
-impl PressureField {
-    /// The field of a substep.
-    pub(super) fn of(step: &FlipSubstep<'_>, trace: &Trace) -> Self {
-        let taken = |change: &DVec3| (-*change / step.kick).as_vec3().to_array();
-        Self {
-            is_buried: find_buried(step, &trace.bricks, &trace.space),
-            bricks: trace.bricks.clone(),
-            kind: trace.space.kind.clone(),
-            pressure: trace.pressure.clone(),
-            taken: trace.faces.change.iter().map(taken).collect(),
-        }
-    }
-}
-
 impl Model {
     /// Returns the work of walls and solids that move in a substep (flip/boundary_work), and of
     /// forces, joules.
@@ -103,10 +74,7 @@ impl Model {
             let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);
             match is_filling {
                 true => 0.0,
-                false => {
-                    -trace.pressure[e]
-                        * (trace.solid_flux[e] + trace.contraction.get(e).unwrap_or(&0.0))
-                }
+                false => -trace.pressure[e] * trace.solid_flux[e],
             }
         });
         let sum: f64 = terms.sum();

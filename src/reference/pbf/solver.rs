@@ -240,9 +240,7 @@ impl Pbf {
         Self {
             model: Model::new(scene, boundary),
             is_drop: Vec::new(),
-            grid: scene
-                .of_projection()
-                .map(|grid| Flip::of_velocities(&grid, boundary)),
+            grid: scene.of_projection().map(|grid| Flip::new(&grid, boundary)),
             scene: scene.to_owned_scene(),
             state: Particles::default(),
             frame: 0,

@@ -66,17 +66,8 @@ pub const FACE_OPEN: Buf<f32> = Buf::new("face_open");
 pub const FACE_LAYER: Buf<u32> = Buf::new("face_layer");
 /// Cells: air, fluid or solid, numbered as in `domain::poisson`.
 pub const CELL_KIND: Buf<u32> = Buf::new("cell_kind");
-/// Cells: Σ ± (1 − f) u_solid over the six faces with open fraction f, outward positive, m/s; less
-/// the flux that makes up for the contraction of water on straight paths.
+/// Cells: Σ ± (1 − f) u_solid over the six faces with open fraction f, outward positive, m/s.
 pub const SOLID_FLUX: Buf<f32> = Buf::new("solid_flux");
-/// Cells: that contraction alone, negative. Follows `stride` values of [`SOLID_FLUX`], if FLIP moves the
-/// particles and boundaries do work.
-pub fn contraction(stride: usize) -> Buf<f32> {
-    SOLID_FLUX.after(stride)
-}
-/// Cells: part of the midpoint rule in the paths of particles, 0 to 1. Exists unless the domain
-/// turns or another solver moves the particles.
-pub const PATH_BEND: Buf<f32> = Buf::new("path_bend");
 /// Cells: density over target density, minus 1. Exists only with the density correction.
 pub const DENSITY_EXCESS: Buf<f32> = Buf::new("density_excess");
 /// Cells: signed distance to the surface, metres, negative in water. Exists only with the

@@ -7,7 +7,7 @@ use crate::{
 };
 use swell_domain::{
     bricks::{Bricks, CELLS, EDGE, table_dims},
-    flip::{LAYERS as FACE_LAYERS, stored_cells},
+    flip::{layers, stored_cells},
     particles::Particles,
 };
 use swell_gpu::{program::Program, sort};
@@ -27,8 +27,13 @@ pub(super) fn no_water(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<bool> {
     vec![false; dims.iter().map(|&n| n as usize).product()]
 }
 
-pub(super) fn bricks(scene: &FlipScene, grid_dims: [u32; 3], is_wet: &[bool]) -> Bricks {
-    laden_bricks(scene, grid_dims, (is_wet, is_wet))
+pub(super) fn bricks(
+    scene: &FlipScene,
+    grid_dims: [u32; 3],
+    is_wet: &[bool],
+    layers: usize,
+) -> Bricks {
+    laden_bricks(scene, grid_dims, (is_wet, is_wet), layers)
 }
 
 /// Lays out bricks with water, those of `is_laden` first.
@@ -36,8 +41,9 @@ pub(super) fn laden_bricks(
     scene: &FlipScene,
     grid_dims: [u32; 3],
     (is_wet, is_laden): (&[bool], &[bool]),
+    layers: usize,
 ) -> Bricks {
-    let reach = (FACE_LAYERS as u32).div_ceil(EDGE);
+    let reach = (layers as u32).div_ceil(EDGE);
     let cells = stored_cells(grid_dims, scene.periodic);
     Bricks::laden_first(cells, scene.periodic, is_wet, is_laden, reach, LEVELS)
 }
@@ -66,8 +72,9 @@ pub fn capacity(scene: &FlipScene, particles: &Particles) -> Capacity {
     if let Some(band) = scene.band() {
         is_wet = band.wet_bricks(particles);
     }
+    // As many layers as a first substep at a moderate speed reaches.
     let flags = (&is_wet[..], &is_laden[..]);
-    capacity_of(&laden_bricks(scene, grid_dims, flags))
+    capacity_of(&laden_bricks(scene, grid_dims, flags, layers(1.0)))
 }
 
 /// Returns the substep of the first survey, which reads only parameters that do not depend on the
@@ -87,7 +94,7 @@ impl Flip {
         self.plan = plan::plan(&self.scene, counts, self.plan.moves);
         let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
         self.program.refit(&buffers, &passes)?;
-        upload_constants(&self.program, &self.plan);
+        upload_constants(&self.program, &self.plan, &self.scene);
         self.recordings = recordings(&self.program, &self.plan, &self.scene);
         self.pressure = pressure_solver(&self.scene, &self.plan);
         Ok(())
@@ -124,11 +131,11 @@ pub(super) fn pressure_solver(scene: &FlipScene, plan: &Plan) -> PressureSolver 
 }
 
 /// Uploads data that does not change between substeps.
-pub(super) fn upload_constants(program: &Program, plan: &Plan) {
+pub(super) fn upload_constants(program: &Program, plan: &Plan, scene: &FlipScene) {
     let cells = plan.counts.bricks.wet * CELLS as usize;
     sort::upload_lengths(program, &CELL_START, cells);
     program.upload(ELEMENT_COUNT, 0, &[[plan.counts.particles as u32, 0, 0, 0]]);
     program.upload_windows(&AXES, &numbers(0, 3));
     // Layer 2 is the first that is extrapolated.
-    program.upload_windows(&LAYERS, &numbers(2, FACE_LAYERS - 1));
+    program.upload_windows(&LAYERS, &numbers(2, layers(scene.settings().cfl)));
 }

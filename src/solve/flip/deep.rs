@@ -31,7 +31,7 @@ impl Flip {
             return Ok(());
         };
         let was_wet = band.wet_bricks(particles);
-        let layout = bricks(&self.scene, self.plan.grid_dims, &was_wet);
+        let layout = bricks(&self.scene, self.plan.grid_dims, &was_wet, 1);
         let grown = self.plan.counts.bricks.grown(capacity_of(&layout));
         if grown != self.plan.counts.bricks {
             self.refit(Counts {

@@ -30,7 +30,7 @@ use swell_domain::{
     bounds::Bounds,
     bricks::{Bricks, CELLS, table_dims},
     budget::Breach,
-    flip::stored_cells,
+    flip::{layers, stored_cells},
     forces::Medium,
     particles::Particles,
     shores::Shores,
@@ -121,8 +121,8 @@ impl Flip {
         let program = Program::new(context, &buffers, &passes, &[])?;
         upload_distance(boundary, &program, scene);
         forces::upload_meshes(&program, scene, Medium::Water);
-        upload_constants(&program, &plan);
-        let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims));
+        upload_constants(&program, &plan, scene);
+        let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
         let mut state = Carried::new(&Particles::default());
         state.bodies = scene.bodies_at_start();
@@ -254,6 +254,7 @@ impl Flip {
 
     /// Lays out bricks around the water and grows the buffers if they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
+        let layers = layers(substep.displacement);
         let with_deep = self.with_deep(is_wet);
         let all_wet = self.with_shores(&with_deep, substep);
         let is_laden = match self.deep {
@@ -261,7 +262,7 @@ impl Flip {
             None => &all_wet[..],
         };
         let flags = (&all_wet[..], is_laden);
-        self.bricks = laden_bricks(&self.scene, self.plan.grid_dims, flags);
+        self.bricks = laden_bricks(&self.scene, self.plan.grid_dims, flags, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
@@ -273,7 +274,7 @@ impl Flip {
         self.relate_deep();
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, &self.state.walls, bricks, substep);
-        let groups = groups(&self.program, &params);
+        let groups = groups(&self.program, &self.scene, &params, layers);
         self.cut = step::cut(&self.scene, &self.state.walls, substep);
         self.kick = substep.kick;
         self.program.upload(PARAMS, 0, &[params]);

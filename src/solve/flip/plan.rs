@@ -7,7 +7,7 @@ use crate::{
 };
 use swell_domain::{
     bricks::{CELLS, table_dims},
-    flip::{LAYERS as FACE_LAYERS, stored_cells},
+    flip::{layers, stored_cells},
     forces::Medium,
 };
 use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
@@ -18,7 +18,7 @@ use swell_scene::{
 
 use super::{
     buffers::*,
-    record::{Commands, WALL_FRICTION, contracts},
+    record::{Commands, FIRST_LAYER, WALL_FRICTION},
 };
 
 /// Faces of one component on one side of a cell that the cell's particles reach.
@@ -112,17 +112,10 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("BODIES", scene.has_bodies()),
         ("BAND", flip.band.is_some()),
         (forces::MESHES, forces::has_meshes(scene, Medium::Water)),
-        ("CONTRACTS", contracts(plan, scene)),
-        ("CONTRACTION", holds_contraction(plan, scene)),
         ("F64", flip.pressure.precision == Precision::F64),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
     holding.map(|(define, _)| define).collect()
-}
-
-/// Returns whether [`contraction`] exists: boundaries do work, and particles move by FLIP's paths.
-fn holds_contraction(plan: &Plan, scene: &FlipScene) -> bool {
-    contracts(plan, scene) && scene.is_worked_on()
 }
 
 /// Returns whether the pass that pushes particles apart reads [`PLACE`].
@@ -192,12 +185,8 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         "flip",
         [FACE_LAYER, CELL_KIND].map(|cells| cells.sized(all)),
     );
-    let planes = if holds_contraction(plan, scene) { 2 } else { 1 };
-    table.watch("flip", SOLID_FLUX.sized(planes * all));
+    table.watch("flip", SOLID_FLUX.sized(all));
     table.watch("flip", DENSITY.sized(all));
-    if contracts(plan, scene) {
-        table.watch("flip", PATH_BEND.sized(all));
-    }
     if flip.density_correction {
         table.watch("flip", DENSITY_EXCESS.sized(all));
     }
@@ -225,8 +214,9 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         table.add("flip", DEEP_SLOT.sized(slots));
         table.watch("flip", DEEP_DEPTH.sized(all));
     }
+    let layers = layers(flip.cfl);
     table.add("flip", PARAMS.sized(1));
     table.add("flip", AXES.sized(3));
-    table.add("flip", LAYERS.sized(FACE_LAYERS - 1));
-    table.add("flip", GROUPS.sized(2));
+    table.add("flip", LAYERS.sized(layers));
+    table.add("flip", GROUPS.sized(FIRST_LAYER + layers));
 }

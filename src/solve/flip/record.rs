@@ -9,7 +9,7 @@ use crate::{
     pressure::bodies,
     trace::Run,
 };
-use swell_domain::{bricks::CELLS, flip::LAYERS as FACE_LAYERS};
+use swell_domain::{bricks::CELLS, flip::layers};
 use swell_gpu::{
     buffer::Workgroups,
     program::Program,
@@ -19,6 +19,9 @@ use swell_gpu::{
 use swell_scene::FlipScene;
 
 use super::{buffers::*, plan::pushes};
+
+/// Index in [`GROUPS`] of the dispatch over the first extrapolated layer; further layers follow.
+pub(super) const FIRST_LAYER: usize = 2;
 
 /// Particles per thread of `flip/survey`; its `RUN`.
 const SURVEY_RUN: usize = 16;
@@ -137,10 +140,24 @@ impl Commands {
     }
 }
 
-/// Returns the contents of `groups`: of passes over [`WET`] and over [`ACTIVE`] cells.
-pub(super) fn groups(program: &Program, params: &FlipParams) -> [Workgroups; 2] {
-    [params.wet_cells, params.active_cells]
-        .map(|cells| spread(&program.context, WORKGROUP, u64::from(cells)).into())
+/// Returns the contents of `groups`. Layers beyond those that the substep needs get empty
+/// dispatches.
+pub(super) fn groups(
+    program: &Program,
+    scene: &FlipScene,
+    params: &FlipParams,
+    needed: usize,
+) -> Vec<Workgroups> {
+    let of = |cells: u32| spread(&program.context, WORKGROUP, u64::from(cells)).into();
+    let mut all = vec![of(params.wet_cells), of(params.active_cells)];
+    // The projection itself provides layer 1.
+    all.resize(
+        FIRST_LAYER + needed.saturating_sub(1),
+        of(params.active_cells),
+    );
+    let planned = FIRST_LAYER + layers(scene.settings().cfl);
+    all.resize(all.len().max(planned), Workgroups::default());
+    all
 }
 
 /// Returns `count` windows that contain consecutive numbers from `first` on.
@@ -190,9 +207,6 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
     commands.push(over("flip/close_gaps", WET));
-    if contracts(plan, scene) {
-        commands.push(over("flip/find_contraction", ACTIVE));
-    }
     if scene.settings().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }
@@ -222,13 +236,6 @@ fn carry(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     scene.has_bodies().then(pass).into_iter().collect()
 }
 
-/// Returns whether the projection makes up for the contraction of straight paths: those of FLIP's
-/// particles, in a domain that does not turn. (There Coriolis's acceleration would turn what flows
-/// in.)
-pub(super) fn contracts(plan: &Plan, scene: &FlipScene) -> bool {
-    plan.moves && !scene.turns_velocities()
-}
-
 fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let look = |PlannedBuffer { spec, .. }: &PlannedBuffer| Command::Dispatch {
         pass: "flip/find_not_finite",
@@ -253,13 +260,10 @@ fn to_particles(
     effects: &[(&'static str, Addition)],
 ) -> Vec<Command> {
     let flip = scene.settings();
-    let bends = contracts(plan, scene).then(|| over("flip/bend_paths", ACTIVE));
-    let mut commands: Vec<Command> = bends.into_iter().collect();
-    commands.push(over("flip/find_change", ACTIVE));
-    // The projection itself provides layer 1.
-    for k in 0..FACE_LAYERS - 1 {
+    let mut commands = vec![over("flip/find_change", ACTIVE)];
+    for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];
-        commands.push(over_listed("flip/extrapolate", ACTIVE, binds));
+        commands.push(over_listed("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     if flip.band.is_some() {
         commands.push(over("flip/carry_deep", WET));

@@ -157,6 +157,6 @@ fn water_at_a_shore_does_not_gather_there() {
     // Negative control: water in cut cells is not incompressible.
     let (fullest, fastest) = crowding(&spoiled(&context));
     println!("{fullest} {fastest}");
-    assert!(fullest < 0.9, "{fullest}");
+    assert!(fullest < 0.7, "{fullest}");
     assert!(fastest > 0.3, "{fastest}");
 }
