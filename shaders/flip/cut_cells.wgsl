@@ -53,20 +53,19 @@ fn rises_over(corners: Corners) -> vec3f {
     );
 }
 
-// Distances at the corners of the face one cell before a cell's lower face across `axis`, as in
-// `corner_distances`, from the solid that is looked at.
+// Distances at the corners of the face one cell before a cell's lower face across `axis`, from the
+// solid that is looked at.
 fn distances_before(cell: vec3f, axis: u32) -> vec4f {
     let a = vec3f(vec3u(axis) == vec3u(0u, 1u, 2u));
     let b = a.zxy;
     let c = a.yzx;
     let start = cell - a;
-    let size = params.cell_size;
     return vec4f(
-        solid_distance_at(size * start),
-        solid_distance_at(size * (start + b)),
-        solid_distance_at(size * (start + c)),
-        solid_distance_at(size * (start + b + c)),
-    ) - 1e-4 * size;
+        corner_distance(start),
+        corner_distance(start + b),
+        corner_distance(start + c),
+        corner_distance(start + b + c),
+    );
 }
 
 // Sums over the same corners of distances to the nearest of the solids that may cut the cell, for

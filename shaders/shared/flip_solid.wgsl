@@ -63,26 +63,25 @@ fn may_cut_by(k: u32, cell: vec3f) -> bool {
 }
 
 #endif
+// Distance at a corner of cells, at `x` in cells. A corner on the surface counts as inside.
+fn corner_distance(x: vec3f) -> f32 {
+    return solid_distance_at(params.cell_size * x) - 1e-4 * params.cell_size;
+}
+
 fn corner_distances(cell: vec3f) -> Corners {
-    let size = params.cell_size;
-    let x = vec2f(cell.x, cell.x + 1.0) * size;
-    let y = vec2f(cell.y, cell.y + 1.0) * size;
-    let z = vec2f(cell.z, cell.z + 1.0) * size;
-    // A corner on the surface counts as inside.
-    let skin = 1e-4 * size;
     let near = vec4f(
-        solid_distance_at(vec3f(x.x, y.x, z.x)),
-        solid_distance_at(vec3f(x.y, y.x, z.x)),
-        solid_distance_at(vec3f(x.x, y.y, z.x)),
-        solid_distance_at(vec3f(x.y, y.y, z.x)),
+        corner_distance(cell),
+        corner_distance(cell + vec3f(1.0, 0.0, 0.0)),
+        corner_distance(cell + vec3f(0.0, 1.0, 0.0)),
+        corner_distance(cell + vec3f(1.0, 1.0, 0.0)),
     );
     let far = vec4f(
-        solid_distance_at(vec3f(x.x, y.x, z.y)),
-        solid_distance_at(vec3f(x.y, y.x, z.y)),
-        solid_distance_at(vec3f(x.x, y.y, z.y)),
-        solid_distance_at(vec3f(x.y, y.y, z.y)),
+        corner_distance(cell + vec3f(0.0, 0.0, 1.0)),
+        corner_distance(cell + vec3f(1.0, 0.0, 1.0)),
+        corner_distance(cell + vec3f(0.0, 1.0, 1.0)),
+        corner_distance(cell + vec3f(1.0, 1.0, 1.0)),
     );
-    return Corners(near - skin, far - skin);
+    return Corners(near, far);
 }
 
 // Sums over the corners of each lower face, and of each upper face.

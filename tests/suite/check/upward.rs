@@ -81,5 +81,11 @@ fn water_beside_a_solid_that_leans_is_within_tolerance_whichever_way_is_up() {
         );
         let (upright, reversed) = ("half, 3u - half", "3u - half, half");
         assert!(rows(upright, reversed).contains(&layers), "{gravity:?}");
+        // And a distance off by a tenth of a cell where a closed face's normal is looked for.
+        let weight = ("flip/cut_cells", "weight of faces for particles");
+        assert!(
+            rows("= cell - a;", "= cell - 1.1 * a;").contains(&weight),
+            "{gravity:?}"
+        );
     }
 }
