@@ -1,8 +1,8 @@
 // Narrow-band FLIP (Ferstl et al. 2016): moves velocity and depth with the water on the grid, for
-// where the next substep has no particles. Semi-Lagrangian (Stam 1999), back along the path of the
-// midpoint rule that particles take, with the density correction's displacement. Velocities are
-// interpolated by cubic Lagrange polynomials, within the range of the eight faces around, where
-// linear ones would act as a viscosity of Δx² / (6 Δt).
+// where the next substep has no particles. Semi-Lagrangian (Stam 1999), back along the path that
+// particles take, straight on by the velocity where they started, with the density correction's
+// displacement. Velocities are interpolated by cubic Lagrange polynomials, within the range of the
+// eight faces around, where linear ones would act as a viscosity of Δx² / (6 Δt).
 #import "shared/thread.wgsl"
 #import "shared/flip_velocity.wgsl"
 
@@ -155,8 +155,8 @@ fn place_before(cell: vec3i, axis: u32) -> vec3f {
     for (var k = 0u; k < 3u; k++) {
         x[k] -= select(0.0, 0.5, k == axis);
     }
-    let middle = params.cell_size * x - 0.5 * params.time_step * velocity;
-    var way = params.time_step * velocity_at(middle, velocity);
+    let start = params.cell_size * x - params.time_step * velocity;
+    var way = params.time_step * velocity_at(start, velocity);
 #ifdef CORRECTION
     way += displacement;
 #endif

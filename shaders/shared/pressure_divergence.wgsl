@@ -7,6 +7,7 @@ alias note = atomic<u32>;
 @group(0) @binding(2) var<storage, read> pressure_block: array<u32>;
 @group(0) @binding(3) var<storage, read> face_open: array<f32>;
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
+// With CONTRACTS the flux that makes up for contraction follows.
 @group(0) @binding(5) var<storage, read> solid_flux: array<f32>;
 @group(0) @binding(10) var<storage, read_write> pressure_stats: PressureStats;
 
@@ -24,7 +25,24 @@ fn through(first: u32, s: u32, t: u32) -> vec4r {
     return vec4r(open) * vec4r(velocity);
 }
 
-// Σ ± f u + solid flux, m/s; 0 where there is no row.
+// Flux into the solids from four cells, less that which makes up for contraction, m/s.
+fn from_solids(first: u32) -> vec4r {
+    let flux = vec4r(vec4f(
+        solid_flux[first], solid_flux[first + 1u], solid_flux[first + 8u], solid_flux[first + 9u]));
+#ifdef CONTRACTS
+    let made_up = phase.stride + first;
+    return flux - vec4r(vec4f(
+        solid_flux[made_up],
+        solid_flux[made_up + 1u],
+        solid_flux[made_up + 8u],
+        solid_flux[made_up + 9u],
+    ));
+#else
+    return flux;
+#endif
+}
+
+// Σ ± f u + solid flux − contraction's, m/s; 0 where there is no row.
 fn outflow(s: Site) -> Pair {
     let own = natural(s.slot, s.block);
     let upper = natural_upper(s);
@@ -41,10 +59,8 @@ fn outflow(s: Site) -> Pair {
         iz - through(z + own, 1u, 8u),
         through(z + upper.z, 1u, 8u) - iz,
     ));
-    let lo = vec4r(
-        vec4f(solid_flux[own], solid_flux[own + 1u], solid_flux[own + 8u], solid_flux[own + 9u]));
-    let hi = vec4r(vec4f(solid_flux[own + 64u], solid_flux[own + 65u], solid_flux[own + 72u],
-        solid_flux[own + 73u]));
+    let lo = from_solids(own);
+    let hi = from_solids(own + 64u);
     let rows = pressure_block[64u * s.slot + s.block] >> 8u;
     let is_row_lo = (vec4u(rows) & vec4u(1u, 2u, 4u, 8u)) != vec4u(0u);
     let is_row_hi = (vec4u(rows) & vec4u(16u, 32u, 64u, 128u)) != vec4u(0u);

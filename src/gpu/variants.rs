@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 96] = [
+const VARIANTS: [&[&str]; 97] = [
     &[],
     &["SOLIDS"],
     &["BAND"],
@@ -40,7 +40,15 @@ const VARIANTS: [&[&str]; 96] = [
         "PUSHED",
         "GHOST_FLUID",
     ],
-    &["SOLIDS", "MOVING_SOLIDS", "SHAPES", "BODIES", "APIC"],
+    &["CONTRACTS"],
+    &[
+        "SOLIDS",
+        "MOVING_SOLIDS",
+        "SHAPES",
+        "BODIES",
+        "APIC",
+        "CONTRACTS",
+    ],
     &[
         "PAGED",
         "PROJECTED",

@@ -111,6 +111,7 @@ mod solve {
     mod apic_solids;
     mod band;
     mod bodies;
+    mod current;
     mod drag;
     mod flip;
     mod flip_passes;

@@ -52,6 +52,8 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
         || names![buffers::LIQUID_DISTANCE],
         gaps::close_gaps,
     ),
+    comparison("flip/find_strain", NONE, gaps::find_strain),
+    comparison("flip/find_contraction", NONE, gaps::find_contraction),
     comparison("flip/find_excess", NONE, grid::find_excess),
     comparison(
         "flip/let_in",
@@ -63,6 +65,7 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
         elements::faces_kept,
         grid::wall_friction,
     ),
+    comparison("flip/bend_paths", elements::faces_kept, gaps::bend_paths),
     comparison("flip/find_change", elements::faces_kept, grid::find_change),
     comparison("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     comparison("flip/carry_deep", NONE, deep::carry_deep),
@@ -118,6 +121,12 @@ pub(crate) struct FlipState {
     space: Option<OpenSpace>,
     /// Densities at cell centres, as on the device.
     density: Option<Vec<f64>>,
+    /// Fluxes that make up for contraction, as on the device; empty without any.
+    contraction: Vec<f64>,
+    /// Part of the midpoint rule in the slots' paths by the strain before forces, as on the device.
+    strained: Vec<f64>,
+    /// Part of the midpoint rule in the slots' paths, as on the device; empty where it serves all.
+    bend: Vec<f64>,
     assembled: Option<Assembled>,
     given: Option<GridTransfer>,
     /// Number of runs of each pass of an iteration on each level.
@@ -167,6 +176,9 @@ impl FlipState {
             sorted: None,
             space: None,
             density: None,
+            contraction: Vec::new(),
+            strained: Vec::new(),
+            bend: Vec::new(),
             assembled: None,
             given: None,
             runs: BTreeMap::new(),

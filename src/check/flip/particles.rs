@@ -8,7 +8,7 @@ use crate::{
 };
 use swell_domain::{bricks::Bricks, parallel};
 use swell_reference::flip::{
-    GridTransfer, Moved, Solid, advect as reference_advect, aim as reference_aim,
+    GridTransfer, Moved, Paths, Solid, advect as reference_advect, aim as reference_aim,
     grid_to_particle as reference_grid_to_particle, push_apart as reference_push_apart,
 };
 use swell_solve::{SolveError, flip::buffers};
@@ -186,14 +186,18 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         return Ok(());
     };
     let (n, elements) = (state.n, state.elements());
-    let faces = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
-    let (step, start) = (state.step(), &state.sorted().cloud.position);
-    let go = |start: &[DVec3]| {
-        let (model, bricks) = (&state.model, &elements.bricks);
-        reference_advect(model, &step, bricks, start, &faces, &given)
+    let velocity = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
+    let (step, sorted) = (state.step(), state.sorted());
+    let paths = Paths {
+        bricks: &elements.bricks,
+        velocity: &velocity,
+        cell: &sorted.cell,
+        bend: &state.bend,
     };
+    let start = &sorted.cloud.position;
+    let go = |start: &[DVec3]| reference_advect(&state.model, &step, &paths, start, &given);
     let reference = go(start);
-    let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
+    let fastest = velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
     let grid = state.distance_error();
     let reach = |x: &DVec3| START.of([x.length(), step.length, fastest, grid]);
     let answers: Vec<Moved> = DVec3::AXES

@@ -98,6 +98,7 @@ impl FlipState {
     fn waters(&self) -> Waters<'_> {
         let centers = &self.assembled().centers;
         Waters::new(&self.model, &self.elements().bricks, self.space(), centers)
+            .with_contraction(&self.contraction)
     }
 
     pub(super) fn precision(&self) -> Precision {
@@ -166,7 +167,8 @@ impl FlipState {
         errors
     }
 
-    /// Returns Σ |f u| plus the magnitude of the solids' flux for each row.
+    /// Returns Σ |f u| plus the magnitudes of the solids' flux and of that of contraction for each
+    /// row.
     fn flow(&self, velocity: &[DVec3]) -> Vec<f64> {
         let (bricks, space) = (&self.elements().bricks, self.space());
         let of_row = |&element: &u32| {
@@ -181,7 +183,8 @@ impl FlipState {
                     through(element, axis) + through(bricks.near(element, up), axis)
                 })
                 .sum();
-            sum + space.solid_flux[element as usize].abs()
+            let made_up = self.contraction.get(element as usize).unwrap_or(&0.0);
+            sum + space.solid_flux[element as usize].abs() + made_up.abs()
         };
         self.system().cell.iter().map(of_row).collect()
     }

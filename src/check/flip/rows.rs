@@ -191,6 +191,17 @@ entries! {
             "a cell, a copy, or a mix of both: 4 operations, a sum of 7 products, and at most \
              twice its quotient (5 u) by a length (16 u) of a rounded velocity (1 u)", tie OF_GAP;
     }
+    "flip/find_strain" {
+        STRAIN = "part of the midpoint rule", "": [terms: "the largest Σ|products of slopes| \
+            (Δt / Δx)² about, over what bends paths"]
+            U * (24.0 * terms + 4.0),
+            "15 products of differences or of sums of two, their sum, and a difference", tie CUT;
+    }
+    "flip/find_contraction" {
+        CONTRACTION = "flux that makes up for contraction", "m/s": [terms: "Σ|products| Δt / Δx"]
+            60.0 * U * terms,
+            "products of a mean of four, an open part and a part between eight bricks", tie CUT;
+    }
     "flip/find_excess" {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT]
             4.0 * U * excess + cut * excess, "a difference, and the product with the open volume";
@@ -353,10 +364,10 @@ entries! {
     }
     "pressure/divergence" {
         RHS = "right-hand side", "m/s": [unit: "U, or 2⁻⁵³ with f64", flow: "Σ|f u|"]
-            10.0 * unit * flow, "7 products and sums";
+            11.0 * unit * flow, "7 products and sums, and a flux less";
         BEFORE = "largest divergence", "1/s": [flow: "the largest Σ|f u| / Δx",
             most: "its own value"]
-            10.0 * U * flow + 4.0 * U * most, "7 products and sums";
+            11.0 * U * flow + 4.0 * U * most, "7 products and sums, and a flux less";
     }
     "pressure/multiply" {
         PRODUCT = "system times direction", "m/s": [unit: "U, or 2⁻⁵³ with f64",
@@ -372,7 +383,7 @@ entries! {
     "pressure/measure_divergence" {
         AFTER = "largest divergence", "1/s": [flow: "the largest Σ|f u| / Δx",
             most: "its own value"]
-            10.0 * U * flow + 4.0 * U * most, "7 products and sums";
+            11.0 * U * flow + 4.0 * U * most, "7 products and sums, and a flux less";
     }
     "pressure/density_source" {
         SOURCE = "right-hand side", "m": [b: "|b|"] 2.0 * U * b, "";
@@ -386,6 +397,11 @@ entries! {
     "flip/boundary_work" {
         WORK = "shares of the work", "W/m²": [sizes: "Σ|p f|"]
             66.0 * U * sizes, "64 products and sums";
+    }
+    "flip/bend_paths" {
+        BEND = "part of the midpoint rule", "": [terms: "the largest Σ|products of slopes| \
+            (Δt / Δx)² about, and what is made up for, over what bends paths"]
+            U * (60.0 * terms + 4.0), "as of the contraction, and two differences", tie CUT;
     }
     "flip/find_change" {
         CHANGE = "change at faces", "m/s": [size: "|v| + |v before|"] U * size, "one difference";

@@ -20,7 +20,7 @@ use swell_solve::{
     SolveError,
     flip::{
         Flip,
-        buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX},
+        buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX, contraction},
     },
     plan::device_limits,
 };
@@ -73,6 +73,7 @@ struct GridState {
     open: Vec<f32>,
     distance: Option<Vec<f32>>,
     flux: Vec<f32>,
+    contraction: Option<Vec<f32>>,
     velocity: Vec<f32>,
 }
 
@@ -239,7 +240,7 @@ impl<'a> Projections<'a> {
         let grid = GridState::read(&solver, &scene)?;
         let cells = grid.cells(&solver);
         let system = System::new(cells);
-        let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
+        let exact = self.exact(&system, &grid.right_side(&solver, &system))?;
         let records = &solver.bricks().records;
         let place = |element: usize, axis: usize| {
             let local = (element % CELLS as usize) as u32;
@@ -274,7 +275,7 @@ impl<'a> Projections<'a> {
     fn errors(&mut self, solver: &Flip, grid: &GridState) -> Result<ProjectionErrors, StudyError> {
         let cells = grid.cells(solver);
         let system = System::new(cells);
-        let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
+        let exact = self.exact(&system, &grid.right_side(solver, &system))?;
         let stride = grid.kind.len();
         // p is q times a factor that is the same on both sides.
         let found = solver.solution(&system.cell)?;
@@ -345,8 +346,22 @@ impl GridState {
             open: solver.field(FACE_OPEN, 3 * stride)?,
             distance: distance.transpose()?,
             flux: solver.field(SOLID_FLUX, stride)?,
+            contraction: (!scene.turns_velocities())
+                .then(|| solver.field(contraction(stride), stride))
+                .transpose()?,
             velocity: solver.field(FACE_VELOCITY, 3 * stride)?,
         })
+    }
+
+    /// Returns the right-hand side of a system of the cells.
+    fn right_side(&self, solver: &Flip, system: &System) -> Vec<f64> {
+        let mut b = system.rhs(self.cells(solver), &self.velocity, &self.flux);
+        if let Some(contraction) = &self.contraction {
+            for (b, &element) in b.iter_mut().zip(&system.cell) {
+                *b += f64::from(contraction[element as usize]);
+            }
+        }
+        b
     }
 
     fn cells<'a>(&'a self, solver: &'a Flip) -> Cells<'a> {

@@ -223,7 +223,7 @@ pub struct Motion<'a> {
 
 impl Motion<'_> {
     /// Returns where water at `x` was before the substep, both in cells: back along the path that
-    /// particles take.
+    /// particles take, straight on by the velocity where they started.
     pub fn origin(&self, x: DVec3) -> DVec3 {
         let Self { model, step, .. } = *self;
         let size = model.cell_size();
@@ -231,9 +231,9 @@ impl Motion<'_> {
             velocity_at(model, self.bricks, field, x, known)
         };
         let here = size * x;
-        let at_start = of(self.velocity, here, DVec3::ZERO);
-        let middle = here - 0.5 * step.length * at_start;
-        let mut way = step.length * of(self.velocity, middle, at_start);
+        let at_end = of(self.velocity, here, DVec3::ZERO);
+        let start = here - step.length * at_end;
+        let mut way = step.length * of(self.velocity, start, at_end);
         if let Some(displacement) = self.displacement {
             way += of(displacement, here, DVec3::ZERO);
         }

@@ -8,7 +8,7 @@ use swell_domain::{
 };
 
 use super::{
-    FlipSubstep, Model, OpenSpace,
+    Faces, FlipSubstep, Model, OpenSpace,
     grid::{along, corner, per_cell},
     water::open_parts,
 };
@@ -46,23 +46,24 @@ struct End {
     beside: f64,
 }
 
-/// Inputs of the search for closing gaps.
-pub struct Gaps<'a> {
+/// Water on the grid before the projection.
+#[derive(Clone, Copy)]
+pub struct Unprojected<'a> {
     /// Scene and grid.
     pub model: &'a Model,
     /// Parameters of the substep.
     pub step: &'a FlipSubstep<'a>,
     /// Layout of the elements.
     pub bricks: &'a Bricks,
-    /// Open space, with cell kinds from [`super::find_water`].
+    /// Open space, with cell kinds from [`super::find_water`], later from [`close_gaps`].
     pub space: &'a OpenSpace,
     /// Relative densities from [`super::gather_centers`].
     pub density: &'a [f64],
-    /// Velocities at the lower faces, including gravity, m/s. Shape (elements, 3 components).
-    pub velocity: &'a [DVec3],
+    /// Velocities at the lower faces, including gravity, and before forces.
+    pub faces: &'a Faces,
 }
 
-impl Gaps<'_> {
+impl Unprojected<'_> {
     /// Returns the length along an axis that a cell lacks, in cells.
     fn lack(&self, element: u32, axis: usize) -> f64 {
         let parts = open_parts(self.step, self.bricks, self.space, element);
@@ -92,7 +93,7 @@ impl Gaps<'_> {
                 end.velocity = match open > 0.0 {
                     true if moves => self.space.closed_velocity[face][axis],
                     true => 0.0,
-                    false => self.velocity[face][axis],
+                    false => self.faces.velocity[face][axis],
                 };
                 return Some(end);
             }
@@ -103,7 +104,7 @@ impl Gaps<'_> {
             end.gap += lack;
             if self.density[there as usize] >= 0.5 {
                 end.is_water = true;
-                end.velocity = self.velocity[face][axis];
+                end.velocity = self.faces.velocity[face][axis];
                 end.beside = if k == 0 { lack } else { 0.0 };
                 return Some(end);
             }
@@ -121,7 +122,8 @@ impl Gaps<'_> {
     /// lower faces, of the upper faces and of walls and solids. Their sum is the right-hand side of
     /// the cell's row, before inlets, wall friction and effects.
     pub fn inflow(&self, element: u32) -> [DVec3; 3] {
-        let through = |face: u32| self.space.open[face as usize] * self.velocity[face as usize];
+        let through =
+            |face: u32| self.space.open[face as usize] * self.faces.velocity[face as usize];
         let upper = |axis: usize| through(self.bricks.near(element, along(axis, 1)))[axis];
         [
             through(element),
@@ -195,7 +197,7 @@ impl Gaps<'_> {
 
 /// Turns the cells of closing gaps into water: returns the updated kinds and fluxes, and updates
 /// the distances to the surface, metres, also where water hits a surface.
-pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> OpenSpace {
+pub fn close_gaps(gaps: &Unprojected<'_>, distance: &mut [f64]) -> OpenSpace {
     let filled = per_cell(gaps.bricks, |element| gaps.filled(element, 0.0));
     parallel::for_each_mut(distance, |e, distance| {
         *distance = gaps.hit_distance(e as u32, *distance);

@@ -6,6 +6,7 @@
 //! splits a pass for speed, one function covers both halves. [`Flip`] runs whole frames.
 
 mod bodies;
+mod contraction;
 mod deep;
 pub mod effects;
 mod forces;
@@ -26,9 +27,10 @@ mod wall_friction;
 mod water;
 
 pub use bodies::{BodyCells, carry_bodies, couple_bodies};
+pub use contraction::{MOST, find_contraction};
 pub use deep::{DeepCells, Motion, carry_deep, fill_deep, place_deep};
 pub use forces::{push_drops, push_faces, work_by_cells};
-pub use gaps::{Gaps, close_gaps};
+pub use gaps::{Unprojected, close_gaps};
 pub use grid::planes;
 pub use model::{FlipSubstep, Model};
 pub use pressure::{Waters, density_source};
@@ -39,7 +41,7 @@ pub use solver::Flip;
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
 pub use to_grid::{Faces, OpenSpace, cut_cells, gather_faces, growth_over};
 pub use to_particles::{
-    GridTransfer, Moved, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
+    GridTransfer, Moved, Paths, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
 };
 pub use trace::Trace;
 pub use wall_friction::{friction_rates, wall_friction};

@@ -24,6 +24,8 @@ pub struct Waters<'a> {
     distance: Option<&'a [f64]>,
     /// Σ ± (1 − f) u_solid of each cell, m/s.
     flux: Vec<f64>,
+    /// Flux that makes up for the contraction of each cell, m/s; empty if none does.
+    contraction: &'a [f64],
     bodies: &'a [BodyCells],
 }
 
@@ -41,6 +43,7 @@ impl<'a> Waters<'a> {
             open: planes(&space.open),
             distance: model.has_ghost_fluid().then_some(&centers.distance),
             flux: space.solid_flux.clone(),
+            contraction: &[],
             bodies: &[],
         }
     }
@@ -49,6 +52,15 @@ impl<'a> Waters<'a> {
     #[must_use]
     pub fn with_bodies(self, bodies: &'a [BodyCells]) -> Self {
         Self { bodies, ..self }
+    }
+
+    /// Makes up for the contraction of the water on straight paths ([`super::find_contraction`]).
+    #[must_use]
+    pub fn with_contraction(self, contraction: &'a [f64]) -> Self {
+        Self {
+            contraction,
+            ..self
+        }
     }
 
     /// Adds to the solids' flux that of changes of the bodies' velocities.
@@ -94,9 +106,14 @@ impl<'a> Waters<'a> {
         system
     }
 
-    /// Reference pass of `pressure/divergence`: −(Σ ± f u + solid flux) for each row, m/s.
+    /// Reference pass of `pressure/divergence`: −(Σ ± f u + solid flux − contraction's) for each
+    /// row, m/s.
     pub fn divergence(&self, system: &System, velocity: &[DVec3]) -> Vec<f64> {
-        system.rhs(self.cells(), &planes(velocity), &self.flux)
+        let mut flux = self.flux.clone();
+        for (flux, made_up) in flux.iter_mut().zip(self.contraction) {
+            *flux -= made_up;
+        }
+        system.rhs(self.cells(), &planes(velocity), &flux)
     }
 
     /// Converts values per row to values per element; 0 where there is no row.

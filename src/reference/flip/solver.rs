@@ -3,24 +3,27 @@
 use glam::DVec3;
 
 use super::{
-    BodyCells, Centers, Cloud, DeepCells, Faces, Gaps, Model, Motion, Trace, Waters, advect, aim,
-    assign_cells,
+    BodyCells, Centers, Cloud, DeepCells, Faces, Model, Motion, Paths, Trace, Unprojected, Waters,
+    advect, aim, assign_cells,
     bodies::{Stopped, sped_up},
-    carry_bodies, carry_deep, close_gaps, couple_bodies, cut_cells,
+    carry_bodies, carry_deep, close_gaps,
+    contraction::Straight,
+    couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
-    extrapolate, fill_deep, find_buried, find_change, find_depth, find_excess, find_water, forces,
+    extrapolate, fill_deep, find_change, find_depth, find_excess, find_water, forces,
     gather_centers, gather_faces, grid_to_particle, let_in, place_deep,
     projection::project as project_faces,
     push_apart, reorder,
     sort::by_id,
-    survey, wall_friction,
+    survey,
+    trace::PressureField,
+    wall_friction,
 };
 use crate::{ReferenceError, Timings};
 use swell_contact::SceneContacts;
 use swell_domain::{
     body::{BodyState, Six},
     boundary::Boundary,
-    bricks::Bricks,
     budget::Breach,
     gauge::Gauge,
     particles::{Particles, max_speed},
@@ -29,12 +32,13 @@ use swell_domain::{
 };
 use swell_scene::{FlipScene, step::Substep};
 
-/// FLIP in f64. Frames are rounded to f32, as when written, and the next frame starts from the
-/// rounded state.
+/// FLIP in f64. Frames are rounded to f32, as when written, and the next starts from that state.
 pub struct Flip {
     pub(super) model: Model,
     contacts: Option<SceneContacts>,
     factor_budget: u64,
+    /// Whether it moves particles, and not only projects their velocities.
+    moves: bool,
     pub(super) state: Particles,
     /// Water without particles; `None` without a band.
     pub(super) deep: Option<DeepCells>,
@@ -42,18 +46,6 @@ pub struct Flip {
     timings: Timings,
     /// Pressure field of the last substep; `None` before the first.
     field: Option<PressureField>,
-}
-
-/// A pressure field on cells.
-struct PressureField {
-    bricks: Bricks,
-    kind: Vec<u32>,
-    /// Whether each cell's centre is inside a wall or solid.
-    is_buried: Vec<bool>,
-    /// Pressure by element, Pa.
-    pressure: Vec<f64>,
-    /// See [`Gauge::taken`].
-    taken: Vec<[f32; 3]>,
 }
 
 impl Flip {
@@ -64,11 +56,20 @@ impl Flip {
             model: Model::new(scene, boundary),
             contacts: SceneContacts::of(scene),
             factor_budget: 0,
+            moves: true,
             state: Particles::default(),
             deep: None,
             frame: 0,
             timings: Timings::default(),
             field: None,
+        }
+    }
+
+    /// Creates the solver for [`Self::project_velocities`] alone.
+    pub fn of_velocities(scene: &FlipScene, boundary: &Boundary) -> Self {
+        Self {
+            moves: false,
+            ..Self::new(scene, boundary)
         }
     }
 
@@ -95,6 +96,7 @@ impl Flip {
             model,
             timings,
             factor_budget,
+            moves,
             state,
             contacts,
             deep,
@@ -137,17 +139,24 @@ impl Flip {
             find_water(model, &bricks, &space, &depth)
         });
         space.kind = kind;
-        space = timings.time("flip/close_gaps", || {
-            let gaps = Gaps {
-                model,
-                step: &step,
-                bricks: &bricks,
-                space: &space,
-                density: &density,
-                velocity: &faces.velocity,
+        let forced = Unprojected {
+            model,
+            step: &step,
+            bricks: &bricks,
+            space: &space,
+            density: &density,
+            faces: &faces,
+        };
+        let closed = timings.time("flip/close_gaps", || close_gaps(&forced, &mut distance));
+        let mut straight = Straight::default();
+        if *moves && !model.scene.turns_velocities() {
+            let water = Unprojected {
+                space: &closed,
+                ..forced
             };
-            close_gaps(&gaps, &mut distance)
-        });
+            straight = Straight::before_projection(&water, timings);
+        }
+        space = closed;
         let mut excess = match model.settings().density_correction {
             true => timings.time("flip/find_excess", || {
                 find_excess(&step, &bricks, &space, &density)
@@ -190,7 +199,9 @@ impl Flip {
         };
         let touched: Vec<BodyCells>;
         let waters = Waters::new(model, &bricks, &space, &centers);
-        let mut waters = waters.with_bodies(&coupled);
+        let mut waters = waters
+            .with_bodies(&coupled)
+            .with_contraction(&straight.contraction);
         let by_weight: Vec<Six> = coupled.iter().map(BodyCells::before).collect();
         waters.carry_flux(&by_weight);
         let mut carried = by_weight.clone();
@@ -243,6 +254,15 @@ impl Flip {
                 after_contacts = Some(found);
             }
         }
+        let water = Unprojected {
+            model,
+            step: &step,
+            bricks: &bricks,
+            space: &space,
+            density: &centers.density,
+            faces: &faces,
+        };
+        let bend = timings.time("flip/bend_paths", || straight.bend(&water));
         step.solids = model.solids_at(&bodies, step.start, step.length);
         timings.time("flip/extrapolate", || {
             find_change(model, &bricks, &space, &mut faces);
@@ -280,7 +300,13 @@ impl Flip {
         }
         let moved = timings.time("flip/advect", || {
             let position = &sorted.cloud.position;
-            advect(model, &step, &bricks, position, &faces.velocity, &given)
+            let paths = Paths {
+                bricks: &bricks,
+                velocity: &faces.velocity,
+                cell: &sorted.cell,
+                bend: &bend,
+            };
+            advect(model, &step, &paths, position, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.kick;
         let mut pressure = waters.by_element(&projected.system, &projected.solution.x);
@@ -336,14 +362,7 @@ impl Flip {
             )?;
         }
         let step = self.model.step(substep, &self.state.walls, &trace.bodies);
-        let taken = |change: &DVec3| (-*change / substep.kick).as_vec3().to_array();
-        self.field = Some(PressureField {
-            is_buried: find_buried(&step, &trace.bricks, &trace.space),
-            bricks: trace.bricks.clone(),
-            kind: trace.space.kind.clone(),
-            pressure: trace.pressure.clone(),
-            taken: trace.faces.change.iter().map(taken).collect(),
-        });
+        self.field = Some(PressureField::of(&step, &trace));
         Ok(trace)
     }
 
@@ -352,7 +371,7 @@ impl Flip {
         &self.state.bodies
     }
 
-    /// Copies the states of absorbing walls and bodies from `state`.
+    /// Copies absorbing walls and bodies from `state`.
     pub fn take_boundaries(&mut self, state: &Particles) {
         self.state.walls = state.walls;
         self.state.bodies.clone_from(&state.bodies);

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::{
     Faces, FlipSubstep, Model, OpenSpace, Sorted,
+    contraction::bend_at,
     grid::{along, neighborhood, per_cell},
     solids,
 };
@@ -460,26 +461,48 @@ pub fn push_apart(
     parallel::map(0..sorted.cell.len(), one)
 }
 
-/// Advects particles by the midpoint rule and the density correction's displacement, keeps them out
-/// of solids and walls, and removes their velocity component into these. A particle that would move
-/// farther than the cap is slowed.
+/// The field that particles go by, and where they do not go straight on.
+#[derive(Clone, Copy)]
+pub struct Paths<'a> {
+    /// Layout of the elements.
+    pub bricks: &'a Bricks,
+    /// Velocities at the lower faces, m/s.
+    pub velocity: &'a [DVec3],
+    /// Element of each particle's cell.
+    pub cell: &'a [u32],
+    /// Part of the midpoint rule by slot (flip/bend_paths); everywhere 1 if empty.
+    pub bend: &'a [f64],
+}
+
+/// Advects particles by the grid's velocity at their positions, or, where paths are bent, by the
+/// midpoint rule, and by the density correction's displacement; keeps them out of solids and walls,
+/// and removes their velocity component into these. A particle that would move farther than the cap
+/// is slowed.
 pub fn advect(
     model: &Model,
     step: &FlipSubstep<'_>,
-    bricks: &Bricks,
+    paths: &Paths<'_>,
     position: &[DVec3],
-    velocity: &[DVec3],
     given: &GridTransfer,
 ) -> Moved {
     let contact = model.contact_distance();
     let (low, high) = (step.walls.min + contact, step.walls.max - contact);
     let one = |i: usize| {
         let (start, here) = (position[i], given.carried[i]);
-        let middle = start + 0.5 * step.length * here;
+        let bend = match paths.bend {
+            [] => 1.0,
+            bend => bend_at(paths.bricks, bend, paths.cell[i], start / model.cell_size()),
+        };
         // A droplet continues ballistically: faces along its path may belong to other water.
         let between = match given.is_drop[i] {
             true => here,
-            false => velocity_at(model, bricks, velocity, middle, here),
+            false => {
+                let middle = start + 0.5 * step.length * here;
+                here.lerp(
+                    velocity_at(model, paths.bricks, paths.velocity, middle, here),
+                    bend,
+                )
+            }
         };
         let mut way = step.length * between + given.displacement[i];
         let distance = way.length();

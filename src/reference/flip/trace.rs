@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{
     BodyCells, Centers, Cloud, Faces, FlipSubstep, GridTransfer, Model, OpenSpace, Sorted,
-    is_filling, projection::Projected,
+    find_buried, is_filling, projection::Projected,
 };
 use swell_domain::{body::BodyState, bricks::Bricks, solver::Projection};
 
@@ -62,6 +62,32 @@ impl Trace {
         self.projections()
             .for_each(|projected| projected.add_to(all));
         all.missed += u32::from(self.is_short);
+    }
+}
+
+/// A pressure field on cells.
+pub(super) struct PressureField {
+    pub(super) bricks: Bricks,
+    pub(super) kind: Vec<u32>,
+    /// Whether each cell's centre is inside a wall or solid.
+    pub(super) is_buried: Vec<bool>,
+    /// Pressure by element, Pa.
+    pub(super) pressure: Vec<f64>,
+    /// See [`swell_domain::gauge::Gauge::taken`].
+    pub(super) taken: Vec<[f32; 3]>,
+}
+
+impl PressureField {
+    /// The field of a substep.
+    pub(super) fn of(step: &FlipSubstep<'_>, trace: &Trace) -> Self {
+        let taken = |change: &DVec3| (-*change / step.kick).as_vec3().to_array();
+        Self {
+            is_buried: find_buried(step, &trace.bricks, &trace.space),
+            bricks: trace.bricks.clone(),
+            kind: trace.space.kind.clone(),
+            pressure: trace.pressure.clone(),
+            taken: trace.faces.change.iter().map(taken).collect(),
+        }
     }
 }
 

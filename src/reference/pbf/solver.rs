@@ -240,7 +240,9 @@ impl Pbf {
         Self {
             model: Model::new(scene, boundary),
             is_drop: Vec::new(),
-            grid: scene.of_projection().map(|grid| Flip::new(&grid, boundary)),
+            grid: scene
+                .of_projection()
+                .map(|grid| Flip::of_velocities(&grid, boundary)),
             scene: scene.to_owned_scene(),
             state: Particles::default(),
             frame: 0,

@@ -68,6 +68,19 @@ pub const FACE_LAYER: Buf<u32> = Buf::new("face_layer");
 pub const CELL_KIND: Buf<u32> = Buf::new("cell_kind");
 /// Cells: Σ ± (1 − f) u_solid over the six faces with open fraction f, outward positive, m/s.
 pub const SOLID_FLUX: Buf<f32> = Buf::new("solid_flux");
+/// Cells: flux that makes up for the contraction of water on straight paths, m/s. Follows `stride`
+/// values of [`SOLID_FLUX`], unless the domain turns or another solver moves the particles.
+pub fn contraction(stride: usize) -> Buf<f32> {
+    SOLID_FLUX.after(stride)
+}
+/// Slots: part of the midpoint rule in particles' paths by the strain before forces, 0 to 1. Exists
+/// with [`contraction`].
+pub const STRAIN_BEND: Buf<f32> = Buf::new("strain_bend");
+/// Slots: that part by the projected velocities as well. Follows the slots of all `bricks` in
+/// [`BRICK_SLOT`]; exists with [`contraction`].
+pub fn path_bend(bricks: usize) -> Buf<f32> {
+    BRICK_SLOT.after(bricks).retyped()
+}
 /// Cells: density over target density, minus 1. Exists only with the density correction.
 pub const DENSITY_EXCESS: Buf<f32> = Buf::new("density_excess");
 /// Cells: signed distance to the surface, metres, negative in water. Exists only with the

@@ -127,7 +127,11 @@ pub(super) fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> R
 
 pub(super) fn pressure_solver(scene: &FlipScene, plan: &Plan) -> PressureSolver {
     let flip = scene.settings();
-    PressureSolver::new(&flip.pressure, extent(scene), plan.counts.bricks.slots)
+    PressureSolver::new(
+        &flip.pressure,
+        extent(plan, scene),
+        plan.counts.bricks.slots,
+    )
 }
 
 /// Uploads data that does not change between substeps.

@@ -18,7 +18,7 @@ use swell_scene::{
 
 use super::{
     buffers::*,
-    record::{Commands, FIRST_LAYER, WALL_FRICTION},
+    record::{Commands, FIRST_LAYER, WALL_FRICTION, contracts},
 };
 
 /// Faces of one component on one side of a cell that the cell's particles reach.
@@ -37,7 +37,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
     let settings = &flip.pressure;
     table.append(pressure::planned(
         settings,
-        extent(scene),
+        extent(&plan, scene),
         counts.bricks.slots,
     ));
     table.extend("bodies", bodies::planned(scene, plan.grid_dims));
@@ -54,7 +54,12 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
     };
     plan.add_passes(in_order(commands.before_projection()).map(&plain), &effects);
     plan.add_passes(
-        pressure::passes(settings, flip.surface, extent(scene), scene.is_periodic()),
+        pressure::passes(
+            settings,
+            flip.surface,
+            extent(&plan, scene),
+            scene.is_periodic(),
+        ),
         &[],
     );
     plan.add_passes(
@@ -70,7 +75,7 @@ pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let flip = scene.settings();
     let effects = effects::of_flip(scene, plan.counts.bricks.cells());
     let commands = Commands::new(plan, scene, &effects);
-    let projection = pressure::all_commands(flip.pressure.preconditioner, extent(scene));
+    let projection = pressure::all_commands(flip.pressure.preconditioner, extent(plan, scene));
     let before = commands.before_projection().cloned();
     let between = commands.between_projections().cloned();
     let after = commands.after_projection().cloned();
@@ -82,10 +87,11 @@ pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
 }
 
 /// Returns what the scene's projection does.
-pub(super) fn extent(scene: &FlipScene) -> pressure::Extent {
+pub(super) fn extent(plan: &Plan, scene: &FlipScene) -> pressure::Extent {
     pressure::Extent {
         has_correction: scene.settings().density_correction,
         has_bodies: scene.has_bodies(),
+        has_contraction: contracts(plan, scene),
     }
 }
 
@@ -112,6 +118,7 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("BODIES", scene.has_bodies()),
         ("BAND", flip.band.is_some()),
         (forces::MESHES, forces::has_meshes(scene, Medium::Water)),
+        ("CONTRACTS", contracts(plan, scene)),
         ("F64", flip.pressure.precision == Precision::F64),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
@@ -171,7 +178,8 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     let dims = table_dims(stored_cells(plan.grid_dims, scene.periodic));
     let bricks = dims.iter().map(|&n| n as usize).product();
     table.add("flip", SURVEY_IS_WET.sized(bricks));
-    table.add("flip", BRICK_SLOT.sized(bricks));
+    let bends = if contracts(plan, scene) { slots } else { 0 };
+    table.add("flip", BRICK_SLOT.sized(bricks + bends));
     table.add("flip", BRICKS.sized(slots));
     table.add("sort", CELL_START.sized(wet + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, wet));
@@ -185,8 +193,12 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         "flip",
         [FACE_LAYER, CELL_KIND].map(|cells| cells.sized(all)),
     );
-    table.watch("flip", SOLID_FLUX.sized(all));
+    let planes = if contracts(plan, scene) { 2 } else { 1 };
+    table.watch("flip", SOLID_FLUX.sized(planes * all));
     table.watch("flip", DENSITY.sized(all));
+    if contracts(plan, scene) {
+        table.watch("flip", STRAIN_BEND.sized(slots));
+    }
     if flip.density_correction {
         table.watch("flip", DENSITY_EXCESS.sized(all));
     }

@@ -207,6 +207,11 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
     commands.push(over("flip/close_gaps", WET));
+    if contracts(plan, scene) {
+        commands.push(Command::clear(&STRAIN_BEND));
+        commands.push(over("flip/find_strain", ACTIVE));
+        commands.push(over("flip/find_contraction", ACTIVE));
+    }
     if scene.settings().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }
@@ -236,6 +241,13 @@ fn carry(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     scene.has_bodies().then(pass).into_iter().collect()
 }
 
+/// Returns whether the projection makes up for the contraction of straight paths: those of FLIP's
+/// particles, in a domain that does not turn. (There Coriolis's acceleration would turn what flows
+/// in.)
+pub(super) fn contracts(plan: &Plan, scene: &FlipScene) -> bool {
+    plan.moves && !scene.turns_velocities()
+}
+
 fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let look = |PlannedBuffer { spec, .. }: &PlannedBuffer| Command::Dispatch {
         pass: "flip/find_not_finite",
@@ -260,7 +272,9 @@ fn to_particles(
     effects: &[(&'static str, Addition)],
 ) -> Vec<Command> {
     let flip = scene.settings();
-    let mut commands = vec![over("flip/find_change", ACTIVE)];
+    let bends = contracts(plan, scene).then(|| over("flip/bend_paths", ACTIVE));
+    let mut commands: Vec<Command> = bends.into_iter().collect();
+    commands.push(over("flip/find_change", ACTIVE));
     for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];
         commands.push(over_listed("flip/extrapolate", FIRST_LAYER + k, binds));

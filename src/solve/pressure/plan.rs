@@ -223,7 +223,7 @@ pub fn passes(
     let commands = all_commands(settings.preconditioner, extent);
     let names = in_order(&commands);
     names
-        .map(|name| pass(name, settings, surface, (extent.has_bodies, is_periodic)))
+        .map(|name| pass(name, settings, surface, (extent, is_periodic)))
         .collect()
 }
 
@@ -243,7 +243,7 @@ fn pass(
     name: &'static str,
     settings: &Pressure,
     surface: Surface,
-    (has_bodies, is_periodic): (bool, bool),
+    (extent, is_periodic): (Extent, bool),
 ) -> PassSpec {
     let conditions = [
         ("GHOST_FLUID", surface == Surface::GhostFluid),
@@ -255,7 +255,8 @@ fn pass(
         ("TWO_WORDS", settings.precision == Precision::F32Refined),
         ("F64", settings.precision == Precision::F64),
         ("PERIODIC", is_periodic),
-        ("BODIES", has_bodies),
+        ("BODIES", extent.has_bodies),
+        ("CONTRACTS", extent.has_contraction),
     ];
     let holding = conditions.into_iter().filter(|(_, holds)| *holds);
     PassSpec {

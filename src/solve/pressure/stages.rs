@@ -37,6 +37,8 @@ pub struct Extent {
     pub has_correction: bool,
     /// Whether its pressure moves bodies.
     pub has_bodies: bool,
+    /// Whether it makes up for water that contracts on straight paths.
+    pub has_contraction: bool,
 }
 
 /// The stages of a solve for one shape: as commands, or bound to a program's buffers.
@@ -62,6 +64,7 @@ impl Stages<Vec<Command>> {
         let Extent {
             has_correction,
             has_bodies,
+            ..
         } = extent;
         let finest = |pass, when| run(pass, Phase::Level(0), when, Size::Full(0));
         let finish = |pass| run(pass, Phase::Level(0), When::Done, Size::Active);

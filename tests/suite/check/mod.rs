@@ -11,6 +11,7 @@ mod imprecise;
 mod periodic;
 mod quay;
 mod shapes;
+mod straight;
 mod upward;
 mod viscous;
 mod whitewater;

@@ -36,20 +36,6 @@ const FLIP: &[Control] = &[
         &["position"],
     ),
     control(
-        "flip/advect",
-        "wrapped_cell(brick, dims)",
-        "brick",
-        "flip/advect",
-        &["position"],
-    ),
-    control(
-        "flip/advect",
-        "low = select(low, select(vec3i(0), vec3i(-1), is_before), is_periodic());",
-        "",
-        "flip/advect",
-        &["position"],
-    ),
-    control(
         "flip/grid_to_particle",
         "select(to_before, vec3i(1), is_periodic())",
         "to_before",

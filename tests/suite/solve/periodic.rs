@@ -110,9 +110,9 @@ fn where_the_joint_is_does_not_matter() {
         let mut blind = context.clone();
         blind.spoil = Some(match method {
             Method::Flip => InjectedFault {
-                pass: "flip/advect",
-                from: "wrapped_cell(brick, dims)",
-                to: "brick",
+                pass: "flip/grid_to_particle",
+                from: "to_after = select(to_after, vec3i(1), is_periodic());",
+                to: "",
             },
             Method::Pbf => InjectedFault {
                 pass: "pbf/build_neighbors",

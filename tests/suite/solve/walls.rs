@@ -163,6 +163,7 @@ where
 fn water_before_a_wall_that_comes_leaves_no_gap() {
     let context = context();
     let (mut scene, particles) = rig::tank([24, 10, 4], 5);
+    rig::flip(&mut scene).cfl = 3.0;
     scene.shot.frames_per_second = 24.0;
     scene.wave_makers = vec![WaveMaker {
         absorption: None,

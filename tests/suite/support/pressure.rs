@@ -22,6 +22,7 @@ use swell::{
 pub const WITH_CORRECTION: Extent = Extent {
     has_correction: true,
     has_bodies: false,
+    has_contraction: false,
 };
 
 pub struct Rig {

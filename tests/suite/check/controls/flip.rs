@@ -1,6 +1,6 @@
 //! Faults in FLIP's passes.
 
-use super::{Control, control};
+use super::{Control, control, own};
 
 /// Passes that are given another system than the reference's.
 pub const SYSTEM: &[&str] = &[
@@ -21,66 +21,80 @@ pub const SYSTEM: &[&str] = &[
     "pressure/advance",
 ];
 
-pub const FLIP: &[Control] = &[
+/// Passes whose inputs follow the order of the particles.
+const SORTED: &[&str] = &[
+    "sort/place",
+    "sort/stabilize",
+    "flip/gather_faces",
+    "flip/gather_centers",
+    "flip/find_water",
+    "flip/find_excess",
+    "flip/grid_to_particle",
+    "flip/push_apart",
+    "flip/advect",
+];
+
+/// The field of both passes that find it.
+const STRAIN: &[&str] = &["part of the midpoint rule"];
+
+const fn of_contraction(from: &'static str, to: &'static str) -> Control {
+    let fields = &["flux that makes up for contraction"];
     control(
+        "flip/find_contraction",
+        from,
+        to,
+        "flip/find_contraction",
+        fields,
+    )
+}
+
+pub const FLIP: &[Control] = &[
+    own(
         "flip/boundary_work",
         "for (var k = 0u;",
         "for (var k = 16u;",
-        "flip/boundary_work",
         &["shares of the work"],
     ),
-    control(
+    own(
         "flip/survey",
         "dot(v, v)",
         "dot(v, v) * 1.001",
-        "flip/survey",
         &["largest speed squared"],
     ),
-    control(
+    own(
         "flip/reorder",
         "sorted_position[i] = x",
         "sorted_position[i] = packed(1.000001 * three(x))",
-        "flip/reorder",
         &["position"],
     ),
-    control(
+    own(
         "flip/reorder",
         "= velocity[source]",
         "= packed(-three(velocity[source]))",
-        "flip/reorder",
         &["velocity"],
     ),
-    control(
-        "flip/reorder",
-        "= id[source]",
-        "= id[source] ^ 1u",
-        "flip/reorder",
-        &["id"],
-    ),
-    control(
+    own("flip/reorder", "= id[source]", "= id[source] ^ 1u", &["id"]),
+    own(
         "flip/cut_cells",
         "face_open[element] = lower.x",
         "face_open[element] = lower.x * 0.9999",
-        "flip/cut_cells",
         &["open fraction"],
     ),
-    control(
+    own(
         "flip/cut_cells",
         "open_volume[element] = volume;\n    open_hats[element] = hats;\n    let weight = ",
         "open_volume[element] = volume * 0.999;\n    open_hats[element] = hats * 0.999;\n    \
          let weight = 0.999 * ",
-        "flip/cut_cells",
         &[
             "open volume",
             "open part of the hat",
             "weight of faces for particles",
         ],
     ),
-    control(
+    own(
         "flip/cut_cells",
         "pack2x16unorm(hat.layers.xy)",
         "pack2x16unorm(0.999 * hat.layers.xy)",
-        "flip/cut_cells",
         &["open part of the hat's layers"],
     ),
     control(
@@ -90,18 +104,16 @@ pub const FLIP: &[Control] = &[
         "flip/gather_faces",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "flip/gather_faces",
         "velocity + params.velocity_step",
         "velocity - params.velocity_step",
-        "flip/gather_faces",
         &["velocity with gravity"],
     ),
-    control(
+    own(
         "flip/gather_faces",
         "u32(is_known)",
         "u32(!is_known)",
-        "flip/gather_faces",
         &["whether particles are near"],
     ),
     control(
@@ -111,166 +123,187 @@ pub const FLIP: &[Control] = &[
         "flip/gather_centers",
         &["relative density"],
     ),
-    control(
+    own(
         "flip/find_water",
         "share >= 0.5",
         "share >= 0.6",
-        "flip/find_water",
         &["kind of cell"],
     ),
-    control(
+    own(
         "flip/find_water",
         "-depth * params.cell_size",
         "depth * params.cell_size",
-        "flip/find_water",
         &["distance of the surface"],
     ),
-    control(
+    own(
         "flip/find_water",
         "LEAST_DEPTH = 0.02",
         "LEAST_DEPTH = 0.5",
-        "flip/find_water",
         &["distance of the surface"],
     ),
+    own(
+        "flip/find_strain",
+        "atomicStore(&most_of_group, 0u)",
+        "atomicStore(&most_of_group, 0x3f800000u)",
+        STRAIN,
+    )
+    .and(&["flip/find_contraction", "flip/bend_paths"]),
+    of_contraction("-rate * rate * minors", "-1.001 * rate * rate * minors"),
     control(
+        "flip/find_strain",
+        "is_far_a == is_far_b",
+        "is_far_a != is_far_b",
+        "flip/find_contraction",
+        &["flux that makes up for contraction"],
+    )
+    .and(&["flip/find_strain"]),
+    of_contraction("-(along.yzx + ", "-(1.01 * along.yzx + "),
+    of_contraction("own * slopes[component]", "1.01 * own * slopes[component]"),
+    of_contraction("any(to > vec3i(0))", "any(to < vec3i(0))"),
+    of_contraction("face_open[face_at(axis, at)] * straight", "straight"),
+    own(
+        "flip/advect",
+        "start + 0.5 * params.time_step * here",
+        "start + 0.505 * params.time_step * here",
+        &["position"],
+    ),
+    own(
+        "flip/bend_paths",
+        "bend = bend_of",
+        "bend = 0.9 * bend_of",
+        STRAIN,
+    ),
+    own(
+        "flip/advect",
+        "1.0 - sum / max",
+        "1.0 - 0.99 * sum / max",
+        &["position"],
+    ),
+    own(
+        "pressure/divergence",
+        "return flux - vec4r",
+        "return flux + vec4r",
+        &["right-hand side"],
+    ),
+    own(
         "flip/find_excess",
         "= select(0.0, excess * volume, is_water)",
         "= select(0.0, -excess * volume, is_water)",
-        "flip/find_excess",
         &["density excess"],
     ),
-    control(
+    own(
         "flip/let_in",
         "solid_flux[element] -= over",
         "solid_flux[element] -= 0.999 * over",
-        "flip/let_in",
         &["flux with what enters"],
     ),
-    control(
+    own(
         "flip/let_in",
         "min(density_excess[element], 0.0)",
         "density_excess[element]",
-        "flip/let_in",
         &["density excess"],
     ),
-    control(
+    own(
         "effects/grid_curl",
         "by_y.z - by_z.y",
         "by_y.z + by_z.y",
-        "effects/grid_curl",
         &["vorticity"],
     ),
-    control(
+    own(
         "effects/grid_confinement",
         "omega = 0.5",
         "omega = -0.5",
-        "effects/grid_confinement",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "effects/drag_by_cells",
         "params.velocity_step, share",
         "0.99 * params.velocity_step, share",
-        "effects/drag_by_cells",
         &["velocity"],
     ),
-    control(
+    own(
         "effects/absorb_faces",
         "part * face_change[face]",
         "1.001 * part * face_change[face]",
-        "effects/absorb_faces",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "effects/generate_faces",
         "(speed.x * along,",
         "(1.02 * speed.x * along,",
-        "effects/generate_faces",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "effects/generate_faces",
         "exp(wave.w * (y - WAVE_DEPTH))",
         "exp(wave.w * 1.05 * (y - WAVE_DEPTH))",
-        "effects/generate_faces",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "pressure/divergence",
         "pressure_rhs[own + 64u * c] = -b.lo[c]",
         "pressure_rhs[own + 64u * c] = b.lo[c]",
-        "pressure/divergence",
         &["right-hand side"],
     ),
-    control(
+    own(
         "pressure/multiply",
         "pressure_correction[phase.stride + e] = product.lo[c]",
         "pressure_correction[phase.stride + e] = product.lo[c] * 1.001",
-        "pressure/multiply",
         &["system times direction"],
     )
     .and(&["pressure/reduce"]),
-    control(
+    own(
         "pressure/project",
         "- change)",
         "+ change)",
-        "pressure/project",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "pressure/project",
         "+ phase.pressure_scale",
         "- phase.pressure_scale",
-        "pressure/project",
         &["pressure"],
     ),
-    control(
+    own(
         "pressure/density_source",
         "real(excess)",
         "real(excess) * 1.001",
-        "pressure/density_source",
         &["right-hand side"],
     ),
-    control(
+    own(
         "pressure/displace",
         "-face.difference",
         "face.difference",
-        "pressure/displace",
         &["displacement at faces"],
     ),
-    control(
+    own(
         "flip/find_change",
         "face_velocity[face] - face_change[face]",
         "face_velocity[face] + face_change[face]",
-        "flip/find_change",
         &["change at faces"],
     ),
-    control(
+    own(
         "flip/extrapolate",
         "face_velocity[face] = sum /",
         "face_velocity[face] = 1.001 * sum /",
-        "flip/extrapolate",
         &["velocity at faces"],
     ),
-    control(
+    own(
         "flip/grid_to_particle",
         "params.pic_blend * (u - advanced)",
         "params.pic_blend * (advanced - u)",
-        "flip/grid_to_particle",
         &["velocity"],
     ),
-    control(
+    own(
         "flip/push_apart",
         "max(apart - distance, 0.0) * direction",
         "max(apart - distance, 0.0) * 1.01 * direction",
-        "flip/push_apart",
         &["displacement"],
     ),
-    control(
+    own(
         "flip/push_apart",
         "max(apart - distance, 0.0) * direction",
         "(apart - distance) * direction",
-        "flip/push_apart",
         &["displacement"],
     ),
     control(
@@ -280,122 +313,89 @@ pub const FLIP: &[Control] = &[
         "flip/push_apart",
         &["displacement"],
     ),
-    control(
+    own(
         "flip/push_apart",
         "* STEPS + UNSURE",
         "* 0.8 * STEPS",
-        "flip/push_apart",
         &["displacement"],
     ),
-    control(
+    own(
         "flip/advect",
-        "+ 0.5 * params.time_step * here",
-        "- 0.5 * params.time_step * here",
-        "flip/advect",
+        "params.time_step * between",
+        "1.001 * params.time_step * between",
         &["position"],
     ),
-    control(
+    own(
         "flip/assign_cells",
         "cell_of[i] = element;",
         "cell_of[i] = element ^ 1u;",
-        "flip/assign_cells",
         &["cell", "particles in cells"],
     )
-    .and(&[
-        "sort/place",
-        "sort/stabilize",
-        "flip/gather_faces",
-        "flip/gather_centers",
-        "flip/find_water",
-        "flip/find_excess",
-        "flip/grid_to_particle",
-        "flip/push_apart",
-        "flip/advect",
-    ]),
-    control(
+    .and(SORTED),
+    own(
         "flip/assign_cells",
         "atomicAdd(&cell_start[element], 1u)",
         "atomicAdd(&cell_start[element], 1u) * 2u",
-        "flip/assign_cells",
         &["slots in cells"],
     )
-    .and(&[
-        "sort/place",
-        "sort/stabilize",
-        "flip/gather_faces",
-        "flip/gather_centers",
-        "flip/find_water",
-        "flip/find_excess",
-        "flip/grid_to_particle",
-        "flip/push_apart",
-        "flip/advect",
-    ]),
-    control(
+    .and(SORTED),
+    own(
         "flip/survey",
         "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest));",
         "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest)); \
          atomicStore(&survey.is_wet[12u], 1u);",
-        "flip/survey",
         &["bricks with water"],
     ),
-    control(
+    own(
         "flip/cut_cells",
         "select(SOLID, AIR, is_open)",
         "select(AIR, AIR, is_open)",
-        "flip/cut_cells",
         &["kind of cell"],
     ),
-    control(
+    own(
         "flip/cut_cells",
         "= pushed.x + pushed.y + pushed.z",
         "= pushed.x + pushed.y - pushed.z + 0.01",
-        "flip/cut_cells",
         &["flux of solids"],
     ),
-    control(
+    own(
         "effects/grid_curl",
         "= length(curl)",
         "= 1.001 * length(curl)",
-        "effects/grid_curl",
         &["its length"],
     )
     .and(&["effects/grid_confinement"]),
-    control(
+    own(
         "pressure/build_system",
         "row.dirichlet += air",
         "row.dirichlet += air * 1.001",
-        "pressure/build_system",
         &["what air adds to the diagonal"],
     )
     .and(SYSTEM),
-    control(
+    own(
         "pressure/build_system",
         "row.coefficient[k] = coefficient",
         "row.coefficient[k] = coefficient * 0.999",
-        "pressure/build_system",
         &["coefficients"],
     )
     .and(SYSTEM),
-    control(
+    own(
         "pressure/build_system",
         "(rows << 8u)",
         "((rows ^ 1u) << 8u)",
-        "pressure/build_system",
         &["rows"],
     )
     .and(SYSTEM),
-    control(
+    own(
         "pressure/divergence",
         "worst / phase.cell_size",
         "worst",
-        "pressure/divergence",
         &["largest divergence"],
     ),
-    control(
+    own(
         "pressure/measure_divergence",
         "worst / phase.cell_size",
         "1.0 + worst / phase.cell_size",
-        "pressure/measure_divergence",
         &["largest divergence"],
     ),
     control(
@@ -419,154 +419,133 @@ pub const FLIP: &[Control] = &[
         &["‖b − A x‖ / ‖b‖"],
     )
     .and(&["pressure/reduce"]),
-    control(
+    own(
         "flip/find_change",
         "1u, is_beside)",
         "2u, is_beside)",
-        "flip/find_change",
         &["layers"],
     ),
-    control(
+    own(
         "flip/extrapolate",
         "face_change[face] = change;",
         "face_change[face] = -change;",
-        "flip/extrapolate",
         &["change at faces"],
     ),
-    control(
+    own(
         "flip/extrapolate",
         "own_layer << (8u * component)",
         "(own_layer + 1u) << (8u * component)",
-        "flip/extrapolate",
         &["layers"],
     ),
-    control(
+    own(
         "flip/grid_to_particle",
         "carried[k] = u;",
         "carried[k] = 1.001 * u;",
-        "flip/grid_to_particle",
         &["velocity of the grid"],
     ),
-    control(
+    own(
         "flip/grid_to_particle",
         "= per_whole * value_at(faces.shift, a, b, c)",
         "= -per_whole * value_at(faces.shift, a, b, c)",
-        "flip/grid_to_particle",
         &["displacement"],
     ),
-    control(
+    own(
         "flip/advect",
         "velocity[i] = packed(v)",
         "velocity[i] = packed(v * 1.00001)",
-        "flip/advect",
         &["velocity"],
     ),
-    control(
+    own(
         "flip/advect",
         "atomicAdd(&counters.capped, 1u)",
         "atomicAdd(&counters.capped, 3u)",
-        "flip/advect",
         &["particles slowed"],
     ),
-    control(
+    own(
         "flip/advect",
         "id[i] = id[params.particle_count + i]",
         "id[i] = id[params.particle_count + i] ^ 1u",
-        "flip/advect",
         &["id"],
     ),
-    control(
+    own(
         "pressure/coarsen",
         "0.25 * sum",
         "0.2501 * sum",
-        "pressure/coarsen",
         &["coefficients"],
     ),
-    control(
+    own(
         "pressure/coarsen",
         "0.5 * air",
         "0.501 * air",
-        "pressure/coarsen",
         &["what air adds to the diagonal"],
     ),
-    control(
+    own(
         "pressure/coarsen",
         "select(2u, 1u, is_full), 0u, is_empty",
         "select(2u, 2u, is_full), 2u, is_empty",
-        "pressure/coarsen",
         &["kind of block"],
     ),
-    control(
+    own(
         "pressure/smooth_first",
         "wr + w * (",
         "wr - w * (",
-        "pressure/smooth_first",
         &["correction"],
     )
     .and(&["pressure/reduce"]),
-    control(
+    own(
         "pressure/prolong",
         "about.zu + above.upper.z",
         "about.zu + 1.01 * above.upper.z",
-        "pressure/prolong",
         &["correction"],
     ),
     // Further controls, with something to restrict and to sweep, are in the variant of a channel.
-    control(
+    own(
         "pressure/solve_coarse",
         "wr + w * (",
         "wr - w * (",
-        "pressure/solve_coarse",
         &["correction"],
     ),
-    control(
+    own(
         "pressure/solve_coarse",
         "= 0.5 * sum_pair(flow);",
         "= 0.5 * sum_pair(flow) + 1e-3;",
-        "pressure/solve_coarse",
         &["residuals of the coarser levels"],
     ),
-    control(
+    own(
         "pressure/advance",
         "correction + kept",
         "correction - kept",
-        "pressure/advance",
         &["direction"],
     ),
-    control(
+    own(
         "pressure/advance",
         "wr + w * (",
         "wr - w * (",
-        "pressure/advance",
         &["next correction"],
     )
     .and(&["pressure/reduce"]),
-    control(
+    own(
         "pressure/advance",
         "+ alpha_small * p",
         "- alpha_small * p",
-        "pressure/advance",
         &["solution, both words"],
     ),
-    control(
+    own(
         "pressure/advance",
         "- alpha * pressure_correction[phase.stride + e]",
         "- 1.001 * alpha * pressure_correction[phase.stride + e]",
-        "pressure/advance",
         &["residual"],
     ),
-    control(
+    own(
         "pressure/verify",
         "= pressure_rhs[own + 64u * c] - main_part",
         "= 1.001 * pressure_rhs[own + 64u * c] - main_part",
-        "pressure/verify",
         &["residual"],
     ),
-    control(
+    own(
         "pressure/reduce",
         "pressure_control.alpha = alpha",
         "pressure_control.alpha = 1.001 * alpha",
-        "pressure/reduce",
         &["sums and what follows"],
     ),
     // A sum that does not match the values that the pass wrote.
@@ -577,11 +556,10 @@ pub const FLIP: &[Control] = &[
         "pressure/reduce",
         &["sums and what follows"],
     ),
-    control(
+    own(
         "pressure/reduce",
         "pressure_control.iterations += 1u",
         "pressure_control.iterations += 2u",
-        "pressure/reduce",
         &["state, iterations, restarts"],
     ),
     control(

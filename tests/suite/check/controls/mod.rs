@@ -39,3 +39,13 @@ pub const fn control(
         follow: &[],
     }
 }
+
+/// A fault that its own pass's rows find.
+pub const fn own(
+    pass: &'static str,
+    from: &'static str,
+    to: &'static str,
+    fields: &'static [&'static str],
+) -> Control {
+    control(pass, from, to, pass, fields)
+}

@@ -12,7 +12,7 @@ use swell::{
     stage::prepare::Start,
 };
 
-use super::{Control, control};
+use super::{Control, control, variants::touch};
 use crate::support::{D, box_mesh, mover};
 
 /// A box that swells and leans.
@@ -55,6 +55,7 @@ pub fn shape(scene: &mut Scene, start: &mut Start) {
         .map(|x| !room.contains(DVec3::from_array(x.map(f64::from))))
         .collect();
     start.particles.retain(&keep);
+    touch(&mut start.particles, &room.grown(-0.01));
     start.particles.id = (0..start.particles.len() as u32).collect();
 }
 

@@ -84,6 +84,18 @@ fn moving_solid(scene: &mut Scene, start: &mut Start) {
         id: (0..kept.len() as u32).collect(),
         ..Particles::default()
     };
+    touch(&mut start.particles, &bounds);
+}
+
+/// Puts particles against the upper sides of a box, which they run into.
+pub(super) fn touch(particles: &mut Particles, bounds: &Bounds) {
+    for k in 0..24 {
+        let part = |n: u64| 0.5 + 0.5 * noise(700 + 3 * k as u64 + n);
+        let mut x = bounds.min + DVec3::new(part(0), part(1), part(2)) * bounds.size();
+        x[k % 3] = bounds.max[k % 3] + 0.02 * D;
+        particles.position[k] = x.as_vec3().to_array();
+        particles.velocity[k][k % 3] = -2.0;
+    }
 }
 
 /// All six walls, two of which cut cells of water.
