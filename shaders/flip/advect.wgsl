@@ -4,7 +4,7 @@
 // cap is slowed and counted.
 // The velocity farther along the path is not that of the water when it gets there: the flow moves
 // along with it. A midpoint rule in the field of the substep's start makes waves on a current grow.
-// It serves where the water contracts on straight paths (flip/bend_paths), and in domains that turn.
+// It serves where the water is violent (flip/bend_paths), and in domains that turn.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/counters.wgsl"

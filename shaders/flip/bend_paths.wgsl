@@ -1,6 +1,6 @@
-// Where paths are not straight: where the water strained before forces (flip/find_strain), and where
-// the projected velocities contract it by much more or less than the projection has made up for, as
-// where it lands.
+// Where paths are not straight: where the water strained before forces (flip/find_strain), and
+// where the projected velocities contract it by much more or less than the projection has made up
+// for, as where it lands.
 #import "shared/thread.wgsl"
 #import "shared/flip_contraction.wgsl"
 #import "shared/flip_spread_bend.wgsl"

@@ -1,5 +1,5 @@
-// Right-hand side −(Σ ± f u + solid flux − contraction's) of the rows, the initial solution and residual of the
-// iteration, and the largest |∇·u| in a cell with a row.
+// Right-hand side −(Σ ± f u + solid flux − contraction's) of the rows, the initial solution and
+// residual of the iteration, and the largest |∇·u| in a cell with a row.
 #import "shared/pressure_divergence.wgsl"
 #import "shared/pressure_sum.wgsl"
 

@@ -25,7 +25,8 @@ fn sum_through_faces() -> f32 {
     return sum;
 }
 
-// Contraction in a substep, as a part of a cell's volume, after `open_neighborhood` and `find_bends`.
+// Contraction in a substep, as a part of a cell's volume; after `open_neighborhood` and
+// `find_bends`.
 fn contraction_in(element: u32, cell: vec3f) -> f32 {
     let is_plain = is_whole(element, cell) && is_straight();
     var minors = 0.0;

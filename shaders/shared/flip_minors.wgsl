@@ -97,8 +97,8 @@ fn sum_of_minors() -> f32 {
     return sum;
 }
 
-// At the edge between the lower face of `axis` of the cell at `at` and the one at `at + to`: the mean
-// of a component times the slope there of the face's own component; and whether it counts.
+// At the edge between the lower face of `axis` of the cell at `at` and the one at `at + to`: the
+// mean of a component times the slope there of the face's own component; and whether it counts.
 fn carried_at_edge(axis: u32, component: u32, at: vec3i, to: vec3i) -> vec2f {
     let back = at - unit(axis);
     let edge = max(to, vec3i(0));
@@ -114,8 +114,8 @@ fn carried_at_edge(axis: u32, component: u32, at: vec3i, to: vec3i) -> vec2f {
     return vec2f(select(0.0, product, counts && !is_closed), f32(counts));
 }
 
-// What flows through the lower face of `axis` of the cell at `at`, (m/s)². Its divergence is the sum
-// of minors.
+// What flows through the lower face of `axis` of the cell at `at`, (m/s)². Its divergence is the
+// sum of minors.
 fn through_lower(axis: u32, at: vec3i) -> f32 {
     let back = at - unit(axis);
     let is_water = vec2f(vec2<bool>(is_full(back), is_full(at)));

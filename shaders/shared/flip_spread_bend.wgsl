@@ -1,5 +1,5 @@
 // Spreads the part of the midpoint rule over the bricks around one. The shader that imports this
-// defines `raise`, by which a slot gets at least the float of these bits, whose order is the floats'.
+// defines `raise`, by which a slot gets at least the float of these bits (in the floats' order).
 #import "shared/flip_cell.wgsl"
 
 var<workgroup> most_of_group: atomic<u32>;

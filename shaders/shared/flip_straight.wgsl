@@ -1,5 +1,5 @@
-// How straight paths are: linear between the middles of bricks. The shader that imports this defines
-// `bend_in`, the part of the midpoint rule in a slot.
+// How straight paths are: linear between the middles of bricks. The shader that imports this
+// defines `bend_in`, the part of the midpoint rule in a slot.
 #import "shared/flip_element.wgsl"
 #import "shared/flip_params.wgsl"
 

@@ -224,8 +224,7 @@ impl Measure {
             ],
             Self::TaylorGreen => &[(
                 "dissipation_ratio",
-                "decay of the energy over that of PIC and of the projection, α \
-                 Δx² / (6 Δt) + U² Δt / 8",
+                "decay of the energy over that of PIC, by a viscosity of α Δx² / (6 Δt)",
             )],
             Self::Slide => &[(
                 "slide_ratio",

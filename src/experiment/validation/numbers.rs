@@ -476,9 +476,7 @@ fn taylor_green(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let k = PI / scale.length;
     let turn = TAU / (k * scale.speed);
     if let (Some((_, first)), Some((end, last))) = (energy.first(), energy.last()) {
-        let kept = mean(energy.iter().map(|(_, e)| e / first)).unwrap_or_default();
-        let square = scale.speed.powi(2) * kept;
-        let diffusion = numerical_diffusion(record.scene, record.substeps, *end, square);
+        let diffusion = numerical_diffusion(record.scene, record.substeps, *end);
         // The energy of a Taylor–Green vortex decays as e^(−4 ν k² t).
         let decay = -(last / first).ln();
         out.put(
@@ -505,16 +503,12 @@ fn slide(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     out.draw("speed", curve);
 }
 
-/// Numerical diffusion of a Taylor–Green vortex with this U², m²/s: α Δx² / (6 Δt) from the PIC
-/// fraction (Zhu and Bridson 2005) and U² Δt / 8 from the projection. Advected particles keep their
-/// energy, and the projection removes the divergent part of their field, Δt ∇p / ρ: half its square
-/// in each step, whose mean is U⁴ k² / 4, from an energy of U² / 4 that a viscosity ν reduces at
-/// the rate 4 ν k² (the loss described by Zehnder, Narain and Thomaszewski 2018).
-fn numerical_diffusion(scene: &Scene, substeps: u32, seconds: f64, square: f64) -> f64 {
+/// Numerical diffusion of the PIC fraction, m²/s: α Δx² / (6 Δt) (Zhu and Bridson 2005).
+fn numerical_diffusion(scene: &Scene, substeps: u32, seconds: f64) -> f64 {
     let Some(scene) = scene.with_flip() else {
         return f64::NAN;
     };
     let step = seconds / f64::from(substeps.max(1));
     let blend = scene.substep_pic_blend(step);
-    blend * scene.settings().cell_size.powi(2) / (6.0 * step) + square * step / 8.0
+    blend * scene.settings().cell_size.powi(2) / (6.0 * step)
 }

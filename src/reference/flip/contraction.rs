@@ -189,7 +189,7 @@ fn local(element: u32) -> DVec3 {
     DVec3::from_array([cell % 8, cell / 8 % 8, cell / 64].map(f64::from))
 }
 
-/// Returns the slots of an element's brick and of those on the cell's side of its middle: x fastest.
+/// Returns the slots of an element's brick and those on the cell's side of its middle, x fastest.
 fn slots_beside(bricks: &Bricks, element: u32) -> [usize; 8] {
     let cell = local(element);
     let brick = &bricks.records[(element / CELLS) as usize];
@@ -292,8 +292,8 @@ impl Unprojected<'_> {
     }
 
     /// Reference pass of flip/find_strain: returns the part of the midpoint rule in each slot where
-    /// straight paths by the velocities before forces would contract the water by much, there or in a
-    /// brick beside it. Cells count that are open but for a thousandth and `lean`.
+    /// straight paths by the velocities before forces would contract the water by much, there or in
+    /// a brick beside it. Cells count that are open but for a thousandth and `lean`.
     pub fn strain(&self, lean: f64) -> Vec<f64> {
         let rate = self.rate();
         self.spread(lean, |element| {

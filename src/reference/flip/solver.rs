@@ -28,7 +28,7 @@ use swell_domain::{
     gauge::Gauge,
     particles::{Particles, max_speed},
     poisson::FLUID,
-    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Unread, Watch},
+    solver::{PassTime, Projection, Solver, Span, StepReport, Unread, Watch},
 };
 use swell_scene::{FlipScene, step::Substep};
 
@@ -497,7 +497,7 @@ impl Flip {
     }
 
     /// Returns the last substep's pressure field; `None` before the first.
-    fn gauge(&self) -> Option<Gauge<'_>> {
+    pub(super) fn gauge(&self) -> Option<Gauge<'_>> {
         let field = self.field.as_ref()?;
         Some(Gauge {
             bricks: &field.bricks,
@@ -510,34 +510,6 @@ impl Flip {
             density: self.model.scene.water.rest_density,
             rise: self.model.scene.water.rise(),
         })
-    }
-
-    fn show(&self, span: Span, cloud: &Cloud, watch: &mut dyn Watch) -> Result<(), ReferenceError> {
-        let wanted = watch.wants(span);
-        if !wanted.is_any() {
-            return Ok(());
-        }
-        let mut seen = Observed::default();
-        if wanted.particles {
-            seen.particles.id.clone_from(&self.state.id);
-            seen.particles.position.clone_from(&self.state.position);
-            seen.particles.velocity.clone_from(&self.state.velocity);
-            seen.particles.substep = self.state.substep;
-            self.round(cloud, &by_id(cloud), &mut seen.particles);
-            seen.particles.deep = self.rounded_deep();
-        }
-        if wanted.pressures {
-            seen.pressures = self.pressures(&self.model.scene.pressure_points())?;
-        }
-        if let Some(gauge) = self.gauge() {
-            let origin = self.model.scene.domain.min;
-            let patches = wanted.patches.iter();
-            seen.patches = patches
-                .map(|patch| gauge.on_face(patch.at - origin, patch.normal()))
-                .collect();
-        }
-        watch.look(span, seen);
-        Ok(())
     }
 }
 

@@ -3,7 +3,14 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{Cloud, DeepCells, Flip, sort::by_id};
-use swell_domain::{band::Band, bricks::Bricks, deep::Deep, particles::Particles};
+use crate::ReferenceError;
+use swell_domain::{
+    band::Band,
+    bricks::Bricks,
+    deep::Deep,
+    particles::Particles,
+    solver::{Observed, Solver, Span, Watch},
+};
 use swell_scene::flip::{AFFINE, Transfer};
 
 impl Flip {
@@ -73,4 +80,40 @@ impl Flip {
 
 fn widen(v: &[f32; 3]) -> DVec3 {
     Vec3::from_array(*v).as_dvec3()
+}
+
+impl Flip {
+    /// Shows the state within a frame to what watches it.
+    pub(super) fn show(
+        &self,
+        span: Span,
+        cloud: &Cloud,
+        watch: &mut dyn Watch,
+    ) -> Result<(), ReferenceError> {
+        let wanted = watch.wants(span);
+        if !wanted.is_any() {
+            return Ok(());
+        }
+        let mut seen = Observed::default();
+        if wanted.particles {
+            seen.particles.id.clone_from(&self.state.id);
+            seen.particles.position.clone_from(&self.state.position);
+            seen.particles.velocity.clone_from(&self.state.velocity);
+            seen.particles.substep = self.state.substep;
+            self.round(cloud, &by_id(cloud), &mut seen.particles);
+            seen.particles.deep = self.rounded_deep();
+        }
+        if wanted.pressures {
+            seen.pressures = self.pressures(&self.model.scene.pressure_points())?;
+        }
+        if let Some(gauge) = self.gauge() {
+            let origin = self.model.scene.domain.min;
+            let patches = wanted.patches.iter();
+            seen.patches = patches
+                .map(|patch| gauge.on_face(patch.at - origin, patch.normal()))
+                .collect();
+        }
+        watch.look(span, seen);
+        Ok(())
+    }
 }

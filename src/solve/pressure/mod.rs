@@ -17,9 +17,11 @@
 //! | `cell_kind` | `u32` cells | [`AIR`], [`FLUID`] or [`SOLID`]; in active slots |
 //! | `face_open` | `f32` planes | open fraction of lower faces, 0 to 1; 0 in slot 0: closed box |
 //! | `face_velocity` | `f32` planes | m/s; a closed face keeps the velocity of the solid |
-//! | `solid_flux` | `f32` cells | Σ ± (1 − f) u_solid over the six faces, outward positive, m/s; with contraction, behind that the flux to let in |
+//! | `solid_flux` | `f32` cells | Σ ± (1 − f) u_solid over the six faces, outward positive, m/s |
 //! | `liquid_distance` | `f32` cells | metres, negative in water; ghost-fluid surface only |
 //! | `density_excess` | `f32` cells | ρ/ρ_target − 1 to correct; density correction only |
+//!
+//! With contraction the flux to let into each cell, m/s, follows in `solid_flux`.
 //!
 //! With the density correction `face_velocity` holds three planes more, for displacements.
 //!
