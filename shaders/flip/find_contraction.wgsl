@@ -41,6 +41,6 @@ fn main(
     }
     if local == 0u {
         let slot = element / CELLS;
-        brick_slot[path_bend_at(slot)] = bitcast<u32>(strain_bend[slot]);
+        brick_slot[path_bend_at(slot)] = strain_bend[slot];
     }
 }

@@ -2,11 +2,11 @@
 #import "shared/flip_minors.wgsl"
 #import "shared/flip_straight.wgsl"
 
-// Part of the midpoint rule in bricks, from the velocities before forces.
-@group(0) @binding(12) var<storage, read> strain_bend: array<f32>;
+// Part of the midpoint rule in bricks, from the velocities before forces, as bits of floats.
+@group(0) @binding(12) var<storage, read> strain_bend: array<u32>;
 
 fn bend_in(slot: u32) -> f32 {
-    return strain_bend[slot];
+    return bitcast<f32>(strain_bend[slot]);
 }
 
 fn sum_through_faces() -> f32 {

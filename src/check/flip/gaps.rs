@@ -117,7 +117,7 @@ pub(super) fn find_strain(state: &mut FlipState, io: &mut Io<'_>) -> PassResult 
     let water = water(state, &step, &faces);
     let straight = vec![0.0; elements.bricks.slots()];
     let terms = |e| water.contraction(&faces.change, &straight, e)[1];
-    let row = (&STRAIN, buffers::STRAIN_BEND);
+    let row = (&STRAIN, buffers::STRAIN_BEND.retyped());
     let found = add_bends((state, io), row, &water, |lean| water.strain(lean), terms)?;
     state.strained = found;
     Ok(())

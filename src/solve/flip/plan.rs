@@ -197,7 +197,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     table.watch("flip", SOLID_FLUX.sized(planes * all));
     table.watch("flip", DENSITY.sized(all));
     if contracts(plan, scene) {
-        table.watch("flip", STRAIN_BEND.sized(slots));
+        table.add("flip", STRAIN_BEND.sized(slots));
     }
     if flip.density_correction {
         table.watch("flip", DENSITY_EXCESS.sized(all));
