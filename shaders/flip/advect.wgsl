@@ -68,11 +68,11 @@ fn main(
     // those around may belong to other water.
     var bend = 1.0 - sorted_velocity[3u * params.particle_count + i];
 #ifdef CONTRACTS
-    let place = start * params.inverse_cell_size;
-    let cell = vec3i(cell_of_place(place));
+    let scaled = start * params.inverse_cell_size;
+    let cell = vec3i(cell_of_place(scaled));
     find_slots(cell);
     find_bends();
-    bend *= 1.0 - straight_at(place - vec3f(cell) + vec3f(own_local));
+    bend *= 1.0 - straight_at(scaled - vec3f(cell) + vec3f(own_local));
 #endif
     var between = here;
     for (var once = 0; once < select(0, 1, bend > 0.0); once++) {

@@ -11,7 +11,7 @@
 @group(0) @binding(4) var<storage, read> solid_flux: array<f32>;
 @group(0) @binding(6) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(7) var<storage, read> face_open: array<f32>;
-// Behind the table of slots, the part of the midpoint rule in them.
+// Behind the table of slots, the weight of the midpoint rule in them.
 @group(0) @binding(5) var<storage, read_write> brick_slot: array<atomic<u32>>;
 
 fn at_face(face: u32) -> f32 {

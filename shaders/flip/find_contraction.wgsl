@@ -11,7 +11,7 @@
 @group(0) @binding(7) var<storage, read> face_open: array<f32>;
 // The flux that makes up for contraction follows that of the solids.
 @group(0) @binding(5) var<storage, read_write> solid_flux: array<f32>;
-// Takes the strain's part of the midpoint rule behind the table of slots.
+// Takes the strain's weight of the midpoint rule behind the table of slots.
 @group(0) @binding(3) var<storage, read_write> brick_slot: array<u32>;
 
 fn at_face(face: u32) -> f32 {
@@ -34,7 +34,8 @@ fn main(
     for (var once = 0; once < select(0, 1, is_full); once++) {
         open_neighborhood(element);
         find_bends();
-        for (var again = 0; again < select(0, 1, is_cut || !is_straight()); again++) {
+        let is_due = is_cut || !is_straight() || is_bounded();
+        for (var again = 0; again < select(0, 1, is_due); again++) {
             let part = part_of(sum_through_faces());
             solid_flux[params.stride + element] = part * params.cell_size / params.time_step;
         }

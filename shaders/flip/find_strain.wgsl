@@ -1,6 +1,6 @@
 // Where water strains so much that paths are not straight: straight ones would contract it by more
-// than flip/find_contraction makes up for, which only knows the velocities before forces. Near such
-// a place particles go by the midpoint rule.
+// than flip/find_contraction makes up for, which only knows the velocities before forces. Near
+// there particles go by the midpoint rule.
 #import "shared/thread.wgsl"
 #import "shared/flip_minors.wgsl"
 #import "shared/flip_spread_bend.wgsl"
@@ -13,7 +13,7 @@
 // The flux that makes up for contraction follows that of the solids: here as if all paths were
 // straight, and nothing cut a cell.
 @group(0) @binding(5) var<storage, read_write> solid_flux: array<f32>;
-// Part of the midpoint rule in bricks.
+// Weight of the midpoint rule in bricks.
 @group(0) @binding(12) var<storage, read_write> strain_bend: array<atomic<u32>>;
 
 fn at_face(face: u32) -> f32 {

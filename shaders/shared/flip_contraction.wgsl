@@ -28,7 +28,7 @@ fn sum_through_faces() -> f32 {
 // Contraction in a substep, as a part of a cell's volume; after `open_neighborhood` and
 // `find_bends`.
 fn contraction_in(element: u32, cell: vec3f) -> f32 {
-    let is_plain = is_whole(element, cell) && is_straight();
+    let is_plain = is_whole(element, cell) && is_straight() && !is_bounded();
     var minors = 0.0;
     for (var once = 0; once < select(0, 1, is_plain); once++) {
         minors = sum_of_minors();

@@ -36,6 +36,15 @@ fn is_full(offset: vec3i) -> bool {
     return is_full_of_water(element_at(offset));
 }
 
+// Whether any face of the cell is closed.
+fn is_bounded() -> bool {
+    var bounded = false;
+    for (var a = 0u; a < 3u; a++) {
+        bounded |= is_shut(a, vec3i(0)) || is_shut(a, unit(a));
+    }
+    return bounded;
+}
+
 // Index of the lower face of the cell at `offset`.
 fn face_at(component: u32, offset: vec3i) -> u32 {
     return component * params.stride + element_at(offset);
@@ -76,7 +85,8 @@ fn product_at_edges(a: u32, b: u32) -> f32 {
         let to_b = select(-unit(b), unit(b), is_far_b);
         let face_a = max(to_a, vec3i(0));
         let face_b = max(to_b, vec3i(0));
-        let is_closed = is_shut(a, face_a) || is_shut(b, face_b);
+        let is_closed = is_shut(a, face_a) || is_shut(b, face_b) || is_shut(a, face_a + to_b)
+            || is_shut(b, face_b + to_a);
         let is_inner = !is_closed && is_full(to_a) && is_full(to_b);
         let across_b = component_at(a, face_a + to_b) - component_at(a, face_a);
         let across_a = component_at(b, face_b + to_a) - component_at(b, face_b);

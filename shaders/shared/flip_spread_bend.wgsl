@@ -1,4 +1,4 @@
-// Spreads the part of the midpoint rule over the bricks around one. The shader that imports this
+// Spreads the weight of the midpoint rule over the bricks around one. The shader that imports this
 // defines `raise`, by which a slot gets at least the float of these bits (in the floats' order).
 #import "shared/flip_cell.wgsl"
 

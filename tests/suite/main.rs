@@ -121,6 +121,7 @@ mod solve {
     mod moving_frame;
     mod moving_solids;
     mod no_slip;
+    mod paths;
     mod pbf;
     mod periodic;
     mod plan;

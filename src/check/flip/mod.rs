@@ -123,9 +123,11 @@ pub(crate) struct FlipState {
     density: Option<Vec<f64>>,
     /// Fluxes that make up for contraction, as on the device; empty without any.
     contraction: Vec<f64>,
-    /// Part of the midpoint rule in the slots' paths by the strain before forces, as on the device.
+    /// Weight of the midpoint rule in the slots' paths by the strain before forces, as on the
+    /// device.
     strained: Vec<f64>,
-    /// Part of the midpoint rule in the slots' paths, as on the device; empty where it serves all.
+    /// Weight of the midpoint rule in the slots' paths, as on the device; empty where it serves
+    /// all.
     bend: Vec<f64>,
     assembled: Option<Assembled>,
     given: Option<GridTransfer>,

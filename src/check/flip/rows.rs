@@ -192,7 +192,7 @@ entries! {
              twice its quotient (5 u) by a length (16 u) of a rounded velocity (1 u)", tie OF_GAP;
     }
     "flip/find_strain" {
-        STRAIN = "part of the midpoint rule", "": [terms: "the largest Σ|products of slopes| \
+        STRAIN = "weight of the midpoint rule", "": [terms: "the largest Σ|products of slopes| \
             (Δt / Δx)² about, over what bends paths"]
             U * (24.0 * terms + 4.0),
             "15 products of differences or of sums of two, their sum, and a difference", tie CUT;
@@ -399,7 +399,7 @@ entries! {
             66.0 * U * sizes, "64 products and sums";
     }
     "flip/bend_paths" {
-        BEND = "part of the midpoint rule", "": [terms: "the largest Σ|products of slopes| \
+        BEND = "weight of the midpoint rule", "": [terms: "the largest Σ|products of slopes| \
             (Δt / Δx)² about, and what is made up for, over what bends paths"]
             U * (60.0 * terms + 4.0), "as of the contraction, and two differences", tie CUT;
     }

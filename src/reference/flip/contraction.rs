@@ -50,6 +50,11 @@ impl Around<'_> {
         self.water.space.open[self.at(offset)][component] == 0.0
     }
 
+    /// Returns whether any face of the cell is closed.
+    fn is_bounded(&self) -> bool {
+        (0..3).any(|axis| self.is_shut(axis, [0; 3]) || self.is_shut(axis, along(axis, 1)))
+    }
+
     /// Returns the slope of each component along its own axis in the cell at `offset`, m/s per
     /// cell. Of a closed face the particles near it only know the side that they are on: there the
     /// slope follows from the other two.
@@ -89,8 +94,11 @@ impl Around<'_> {
             sum[1] += middle[a][1] * middle[b][1];
             let sides = [(-1, -1), (1, -1), (-1, 1), (1, 1)];
             let products = sides.into_iter().filter_map(|(i, j)| {
-                let is_closed =
-                    self.is_shut(a, along(a, i.max(0))) || self.is_shut(b, along(b, j.max(0)));
+                let (of_a, of_b) = (along(a, i.max(0)), along(b, j.max(0)));
+                let is_closed = self.is_shut(a, of_a)
+                    || self.is_shut(b, of_b)
+                    || self.is_shut(a, plus(of_a, along(b, j)))
+                    || self.is_shut(b, plus(of_b, along(a, i)));
                 let is_inner = self.is_full(along(a, i)) && self.is_full(along(b, j));
                 match is_closed {
                     true => Some(0.0),
@@ -173,9 +181,9 @@ impl Around<'_> {
         faces.fold([0.0; 2], |sum, (axis, side)| {
             let at = along(axis, side);
             let open = self.water.space.open[self.at(at)][axis];
-            let mut place = local(self.element) + 0.5;
-            place[axis] += f64::from(side) - 0.5;
-            let straight = straight_at(self.water.bricks, bend, self.element, place);
+            let mut position = local(self.element) + 0.5;
+            position[axis] += f64::from(side) - 0.5;
+            let straight = straight_at(self.water.bricks, bend, self.element, position);
             let sign = f64::from(2 * side - 1);
             let [own, size] = self.through_lower(axis, at).map(|part| open * part);
             [sum[0] + sign * straight * own, sum[1] + size]
@@ -203,10 +211,10 @@ fn slots_beside(bricks: &Bricks, element: u32) -> [usize; 8] {
     })
 }
 
-/// Returns how straight paths are at a place in cells from the corner of an element's brick, on the
-/// cell's side of its middle: linear between the middles of bricks. Absent bricks have no say.
-fn straight_at(bricks: &Bricks, bend: &[f64], element: u32, place: DVec3) -> f64 {
-    let beside = (place - 4.0).abs() / 8.0;
+/// Returns how straight paths are at a position in cells from the corner of an element's brick, on
+/// the cell's side of its middle: linear between the middles of bricks. Absent bricks do not count.
+fn straight_at(bricks: &Bricks, bend: &[f64], element: u32, position: DVec3) -> f64 {
+    let beside = (position - 4.0).abs() / 8.0;
     let weight = |k: usize| {
         let of = |axis: usize| match (k >> axis) & 1 {
             0 => 1.0 - beside[axis],
@@ -222,11 +230,11 @@ fn straight_at(bricks: &Bricks, bend: &[f64], element: u32, place: DVec3) -> f64
     1.0 - sums[0] / sums[1]
 }
 
-/// Returns the part of the midpoint rule in the path from `x`, in cells, within the cell of an
+/// Returns the weight of the midpoint rule in the path from `x`, in cells, within the cell of an
 /// element.
 pub(super) fn bend_at(bricks: &Bricks, bend: &[f64], element: u32, x: DVec3) -> f64 {
-    let place = x - corner(bricks, element) + local(element);
-    1.0 - straight_at(bricks, bend, element, place)
+    let position = x - corner(bricks, element) + local(element);
+    1.0 - straight_at(bricks, bend, element, position)
 }
 
 impl Unprojected<'_> {
@@ -256,7 +264,8 @@ impl Unprojected<'_> {
         let around = self.around(of, element);
         let slots = slots_beside(self.bricks, element);
         let is_straight = slots.iter().all(|&slot| bend[slot] == 0.0);
-        let sum = match is_straight && self.space.volume[element as usize] >= WHOLE {
+        let is_whole = self.space.volume[element as usize] >= WHOLE;
+        let sum = match is_straight && is_whole && !around.is_bounded() {
             true => around.minors(),
             false => around.through_faces(bend),
         };
@@ -291,9 +300,9 @@ impl Unprojected<'_> {
         found
     }
 
-    /// Reference pass of flip/find_strain: returns the part of the midpoint rule in each slot where
-    /// straight paths by the velocities before forces would contract the water by much, there or in
-    /// a brick beside it. Cells count that are open but for a thousandth and `lean`.
+    /// Reference pass of flip/find_strain: returns the weight of the midpoint rule in each slot
+    /// where straight paths by the velocities before forces would contract the water by much, there
+    /// or in a brick beside it. Cells count that are open but for a thousandth and `lean`.
     pub fn strain(&self, lean: f64) -> Vec<f64> {
         let rate = self.rate();
         self.spread(lean, |element| {
@@ -301,8 +310,8 @@ impl Unprojected<'_> {
         })
     }
 
-    /// Returns the part of the midpoint rule in particles' paths in each slot: where `strained` has
-    /// it, and where the projected velocities contract the water by much more or less than the
+    /// Returns the weight of the midpoint rule in particles' paths in each slot: where `strained`
+    /// has it, and where the projected velocities contract the water by much more or less than the
     /// projection has made up for by the fluxes `made_up`, there or in a brick beside it. Cells are
     /// counted as in [`Self::strain`].
     pub fn bend(&self, made_up: &[f64], strained: &[f64], lean: f64) -> Vec<f64> {
@@ -318,7 +327,7 @@ impl Unprojected<'_> {
     }
 }
 
-/// Returns the part of the midpoint rule in the paths of water of which a substep contracts an
+/// Returns the weight of the midpoint rule in the paths of water of which a substep contracts an
 /// unknown part.
 fn bend_of(part: f64) -> f64 {
     (part.abs() / MOST - 1.0).clamp(0.0, 1.0)

@@ -470,7 +470,7 @@ pub struct Paths<'a> {
     pub velocity: &'a [DVec3],
     /// Element of each particle's cell.
     pub cell: &'a [u32],
-    /// Part of the midpoint rule by slot (flip/bend_paths); everywhere 1 if empty.
+    /// Weight of the midpoint rule by slot (flip/bend_paths); everywhere 1 if empty.
     pub bend: &'a [f64],
 }
 

@@ -73,7 +73,7 @@ pub const SOLID_FLUX: Buf<f32> = Buf::new("solid_flux");
 pub fn contraction(stride: usize) -> Buf<f32> {
     SOLID_FLUX.after(stride)
 }
-/// Slots: part of the midpoint rule in particles' paths by the strain before forces, 0 to 1, as
+/// Slots: weight of the midpoint rule in particles' paths by the strain before forces, 0 to 1, as
 /// a float's bits. Exists with [`contraction`].
 pub const STRAIN_BEND: Buf<u32> = Buf::new("strain_bend");
 /// Slots: that part by the projected velocities as well. Follows the slots of all `bricks` in

@@ -10,7 +10,7 @@ use swell::{
 use super::{lines, over};
 use crate::support::{context, device::spoiled, noise};
 
-const BEND: &str = "part of the midpoint rule";
+const BEND: &str = "weight of the midpoint rule";
 
 /// A current through eight bricks, in the first of which the water has noise: there it contracts by
 /// five to ten hundredths on straight paths, which are bent in part as far as two bricks away.
@@ -50,15 +50,21 @@ fn paths_that_are_straight_in_part_are_within_tolerance() {
         ),
         (
             "flip/find_contraction",
-            "abs(place - 4.0) / 8.0",
-            "abs(place - 4.0) / 8.1",
+            "abs(position - 4.0) / 8.0",
+            "abs(position - 4.0) / 8.1",
             "flux that makes up for contraction",
         ),
         ("flip/bend_paths", "MOST = 0.05", "MOST = 0.0005", BEND),
         (
             "flip/advect",
-            "abs(place - 4.0) / 8.0",
-            "abs(place - 4.0) / 16.0",
+            "abs(position - 4.0) / 8.0",
+            "abs(position - 4.0) / 16.0",
+            "position",
+        ),
+        (
+            "flip/advect",
+            "start + 0.5 * params.time_step * here",
+            "start + 0.55 * params.time_step * here",
             "position",
         ),
     ];

@@ -35,7 +35,7 @@ const SORTED: &[&str] = &[
 ];
 
 /// The field of both passes that find it.
-const STRAIN: &[&str] = &["part of the midpoint rule"];
+const STRAIN: &[&str] = &["weight of the midpoint rule"];
 
 const fn of_contraction(from: &'static str, to: &'static str) -> Control {
     let fields = &["flux that makes up for contraction"];
@@ -161,24 +161,7 @@ pub const FLIP: &[Control] = &[
     of_contraction("own * slopes[component]", "1.01 * own * slopes[component]"),
     of_contraction("any(to > vec3i(0))", "any(to < vec3i(0))"),
     of_contraction("face_open[face_at(axis, at)] * straight", "straight"),
-    own(
-        "flip/advect",
-        "start + 0.5 * params.time_step * here",
-        "start + 0.505 * params.time_step * here",
-        &["position"],
-    ),
-    own(
-        "flip/bend_paths",
-        "bend = bend_of",
-        "bend = 0.9 * bend_of",
-        STRAIN,
-    ),
-    own(
-        "flip/advect",
-        "1.0 - sum / max",
-        "1.0 - 0.99 * sum / max",
-        &["position"],
-    ),
+    own("flip/bend_paths", "MOST = 0.05", "MOST = 0.000001", STRAIN),
     own(
         "pressure/divergence",
         "return flux - vec4r",
