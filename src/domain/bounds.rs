@@ -18,6 +18,12 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// The box that contains every point.
+    pub const EVERYWHERE: Self = Self {
+        min: DVec3::NEG_INFINITY,
+        max: DVec3::INFINITY,
+    };
+
     /// Returns the smallest box around `points`; `None` if there are none.
     pub fn of_points(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         points.into_iter().fold(None, |bounds, p| match bounds {

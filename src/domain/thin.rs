@@ -1,9 +1,16 @@
-//! Detects parts of solids that are too thin to hold water back.
+//! Detects parts of solids that are too thin to hold water back, and thickens their distances.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{bounds::Bounds, bvh::Bvh, mesh::TriangleMesh, parallel, sampling::candidate};
+use super::{
+    bounds::Bounds,
+    bvh::{Bvh, nearest_point},
+    mesh::TriangleMesh,
+    parallel,
+    sampling::candidate,
+    signed_distance::SignedDistance,
+};
 
 /// Largest number of rays cast through one mesh.
 const MOST_RAYS: f64 = 131_072.0;
@@ -30,6 +37,10 @@ const CURVED: f64 = 3.0;
 /// Distance before and behind a surface at which its sides are tested, in spacings.
 const BESIDE: f64 = 0.1;
 
+/// Distance from a thickened surface, in spacings, up to which distances are: what particles and
+/// cells of water beside it see.
+const NEAR: f64 = 3.0;
+
 /// Largest number of parts of a mesh that are tested for being a barrier, from the thinnest on; if
 /// there are more, as many are picked at regular intervals.
 const MOST_PARTS: usize = 4096;
@@ -43,18 +54,48 @@ pub struct ThinPart {
     pub thickness: f64,
 }
 
-/// Returns the thinnest part of each of `solids`; `None` if a solid is at least `least` metres
-/// thick everywhere.
+/// Thickness that a wall needs to separate the water on its sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Needed {
+    /// As much along any normal, metres.
+    Everywhere(f64),
+    /// The extent along the wall's normal of a cell with edges of `cell` metres, so that no cell is
+    /// open on both sides: `cell` (|nx| + |ny| + |nz|); and not less than `least` metres.
+    OfCells {
+        /// Edge of a cell, metres.
+        cell: f64,
+        /// Least thickness along any normal, metres.
+        least: f64,
+    },
+}
+
+impl Needed {
+    /// Returns the thickness along a normal, metres.
+    pub fn along(&self, normal: DVec3) -> f64 {
+        match *self {
+            Self::Everywhere(least) => least,
+            Self::OfCells { cell, least } => least.max(cell * normal.abs().element_sum()),
+        }
+    }
+
+    /// Returns the largest thickness along any normal, metres.
+    pub fn most(&self) -> f64 {
+        self.along(DVec3::splat(1.0 / 3f64.sqrt()))
+    }
+}
+
+/// Returns the thinnest part of each of `solids`; `None` if a solid is as thick everywhere as
+/// `needed`.
 ///
 /// Rays go inward along the normals from points spread over the surface, one per squared `spacing`,
 /// fewer on large meshes. A part counts if they come out into open space within `domain` without
-/// passing a layer as thick as `least`, of one solid or several, and if solids cover most of the
+/// passing a layer as thick as needed, of one solid or several, and if solids cover most of the
 /// domain perpendicular to the normal within four spacings.
 pub fn thin_parts(
     solids: &[&TriangleMesh],
     domain: &Bounds,
     spacing: f64,
-    least: f64,
+    needed: Needed,
 ) -> Vec<Option<ThinPart>> {
     let trees: Vec<Bvh> = solids.iter().map(|mesh| Bvh::new(mesh)).collect();
     let all = Solids {
@@ -62,7 +103,8 @@ pub fn thin_parts(
         trees: &trees,
         domain,
         spacing,
-        least,
+        needed,
+        least: needed.most(),
     };
     let thinnest = |mesh: &&TriangleMesh| {
         let points = spread(mesh, domain, spacing);
@@ -80,18 +122,86 @@ pub fn thin_parts(
     solids.iter().map(thinnest).collect()
 }
 
+/// Moves the surface of `solids` outward where they are thinner than `needed`, until they are that
+/// thick. `field` holds the distances to their union; only solids that `is_thin` marks are
+/// thickened.
+///
+/// A node at distance d becomes d − (w − t)/2, where t is the thickness along the normal at the
+/// nearest point of the surface, and w the one needed, if both sides are open ([`thin_parts`]).
+/// Around a rim the thickness along the way to the nearest point grows until it reaches w, so that
+/// the thickened surface is continuous.
+pub fn thicken(
+    field: &mut SignedDistance,
+    solids: &[&TriangleMesh],
+    is_thin: &[bool],
+    domain: &Bounds,
+    needed: Needed,
+) {
+    if !is_thin.contains(&true) {
+        return;
+    }
+    let trees: Vec<Bvh> = solids.iter().map(|mesh| Bvh::new(mesh)).collect();
+    let (origin, spacing, dims) = (field.origin, field.spacing, field.dims);
+    let all = Solids {
+        meshes: solids,
+        trees: &trees,
+        domain,
+        spacing,
+        needed,
+        least: needed.most(),
+    };
+    parallel::for_chunks_mut(&mut field.values, dims[0], |row, values| {
+        let (j, k) = (row % dims[1], row / dims[1]);
+        for (i, value) in values.iter_mut().enumerate() {
+            let x = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
+            let lacks = all.lacking(x, f64::from(*value), is_thin);
+            *value = (f64::from(*value) - 0.5 * lacks) as f32;
+        }
+    });
+}
+
 /// All solids of a scene.
 struct Solids<'a> {
     meshes: &'a [&'a TriangleMesh],
     trees: &'a [Bvh],
     domain: &'a Bounds,
     spacing: f64,
+    needed: Needed,
+    /// The largest thickness that is needed, metres.
     least: f64,
 }
 
 impl Solids<'_> {
     fn is_solid(&self, p: DVec3) -> bool {
         (self.trees.iter()).any(|tree| tree.winding_number(p).abs() > 0.5)
+    }
+
+    /// How much the solid nearest to `x`, at the signed distance `distance`, lacks of the least
+    /// thickness.
+    fn lacking(&self, x: DVec3, distance: f64, is_thin: &[bool]) -> f64 {
+        let bound = NEAR * self.spacing + 0.5 * self.least;
+        let Some((away, solid, t)) = (self.trees.iter().enumerate())
+            .filter_map(|(solid, tree)| {
+                let (away, t) = tree.nearest(x, bound)?;
+                Some((away, solid, t as usize))
+            })
+            .min_by(|(a, ..), (b, ..)| a.total_cmp(b))
+        else {
+            return 0.0;
+        };
+        // In the overlap of two solids the surface of either is none of the union.
+        if !is_thin[solid] || away < distance.abs() - 1e-3 * self.spacing {
+            return 0.0;
+        }
+        let mesh = self.meshes[solid];
+        let [a, b, c] = mesh.corners(t);
+        let p = nearest_point(x, a, b, c);
+        let normal = match away > 1e-6 * self.spacing {
+            true => (x - p) / away * distance.signum(),
+            false => mesh.area_vector(t).normalize(),
+        };
+        let part = self.part(p, normal);
+        part.map_or(0.0, |part| self.needed.along(normal) - part.thickness)
     }
 
     /// Next surface along a ray within `bound`, in lengths of `direction`: its distance and normal.
@@ -109,7 +219,13 @@ impl Solids<'_> {
 
     /// Part behind a point of a surface, if it is thin with open space on both sides.
     fn part(&self, p: DVec3, normal: DVec3) -> Option<ThinPart> {
-        let is_within = |way: f64| self.domain.contains(p - way * normal);
+        // A wall that crosses a side of the domain is open where it leaves it.
+        let facing = normal.abs().cmpgt(DVec3::splat(-OPPOSITE));
+        let (min, max) = (self.domain.min, self.domain.max);
+        let is_within = |way: f64| {
+            let q = p - way * normal;
+            ((q.cmplt(min) | q.cmpgt(max)) & facing).bitmask() == 0
+        };
         let (beside, apart) = (BESIDE * self.spacing, 0.5 * self.spacing);
         if !is_within(-apart) {
             return None;
@@ -123,7 +239,10 @@ impl Solids<'_> {
             let thickness = *thickness.get_or_insert(way);
             if other.dot(normal) < OPPOSITE && !self.is_solid(p - (way + beside) * normal) {
                 let place = p - 0.5 * thickness * normal;
-                let is_thin = is_within(way + apart) && !self.is_solid(p + beside * normal);
+                // A wall of whole cells, rounded, is none.
+                let is_thin = thickness < self.needed.along(normal) * (1.0 - 1e-6)
+                    && is_within(way + apart)
+                    && !self.is_solid(p + beside * normal);
                 return is_thin.then_some(ThinPart { place, thickness });
             }
             if way > 4.0 * self.least {
@@ -201,6 +320,8 @@ fn spread(mesh: &TriangleMesh, domain: &Bounds, spacing: f64) -> Vec<(DVec3, DVe
 
 #[cfg(test)]
 mod tests {
+    use glam::{DQuat, EulerRot};
+
     use super::*;
     use crate::mesh::tests::{box_mesh, sphere};
 
@@ -216,7 +337,7 @@ mod tests {
             min: DVec3::ZERO,
             max: DVec3::splat(2.0),
         };
-        thin_parts(solids, &domain, 0.1, 0.125)
+        thin_parts(solids, &domain, 0.1, Needed::Everywhere(0.125))
     }
 
     /// Thickness and position of a plate across the domain; a plate of sufficient thickness
@@ -231,6 +352,95 @@ mod tests {
             found(&[&boxed([0.9, -1.0, -1.0], [1.026, 3.0, 3.0])]),
             [None]
         );
+    }
+
+    /// A plate becomes one of the least thickness, and where it crosses the domain's sides too;
+    /// beyond its rim nothing changes but around the rim itself. One that is not marked stays.
+    #[test]
+    fn a_thin_plate_has_the_distances_of_a_thick_one() {
+        let domain = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::splat(2.0),
+        };
+        let grid = domain.grown(0.3);
+        let turn = DQuat::from_euler(EulerRot::XYZ, 0.5, 0.4, 0.3);
+        let plate = |half: f64, turn: DQuat| {
+            let mut mesh = boxed([-half, -0.6, -3.0], [half, 3.0, 3.0]);
+            for v in &mut mesh.vertices {
+                *v = turn * *v + DVec3::splat(0.97);
+            }
+            mesh
+        };
+        let cells = Needed::OfCells {
+            cell: 0.2,
+            least: 0.15,
+        };
+        let asked = [Needed::Everywhere(0.15), cells].map(|needed| {
+            let turns = [DQuat::IDENTITY, turn];
+            turns.map(|turn| (needed, turn))
+        });
+        for (needed, turn) in asked.into_iter().flatten() {
+            let half = 0.5 * needed.along(turn * DVec3::X);
+            let field = |half: f64| {
+                SignedDistance::from_mesh(&plate(half, turn), &grid, 0.1).expect("closed")
+            };
+            let thickened = |is_thin: bool| {
+                let mut thin = field(0.01);
+                let solids = [&plate(0.01, turn)];
+                thicken(&mut thin, &solids, &[is_thin], &domain, needed);
+                thin
+            };
+            let (thin, thick, as_is) = (thickened(true), field(half), thickened(false));
+            assert_eq!(as_is, field(0.01));
+            let [nx, ny, _] = thin.dims;
+            let mut compared = 0;
+            for (n, value) in thin.values.iter().enumerate() {
+                let [i, j, k] = [n % nx, n / nx % ny, n / (nx * ny)].map(|i| 0.1 * i as f64);
+                let at = grid.min + DVec3::new(i, j, k);
+                let x = turn.inverse() * (at - DVec3::splat(0.97));
+                // Beyond the sides that the plate faces there is nothing to hold back.
+                let is_between = (0.2..1.8).contains(&at.x);
+                if x.x.abs() < half + 0.3 && x.y > half - 0.6 && is_between {
+                    // Stored as f32, of at most a metre.
+                    assert!((value - thick.values[n]).abs() < 2e-7, "{x} {value}");
+                    compared += 1;
+                }
+                // A rim grows by no more than a side does.
+                let grown = f64::from(as_is.values[n] - value);
+                let most = 0.5 * needed.most() - 0.01;
+                assert!((-1e-7..=most + 1e-7).contains(&grown), "{x} {grown}");
+                if x.y < -0.6 && x.x.abs() < 0.01 {
+                    assert_eq!(grown, 0.0, "{x}");
+                }
+            }
+            assert!(compared > 1000, "{compared}");
+        }
+    }
+
+    /// A skin on the floor or on a block stays as thin as it is, and so does a beach at its end.
+    #[test]
+    fn what_has_water_on_one_side_is_not_thickened() {
+        let domain = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::splat(2.0),
+        };
+        let skin = boxed([-1.0, -0.02, -1.0], [3.0, 0.06, 3.0]);
+        let block = boxed([0.0, 0.0, 0.0], [1.0, 1.0, 2.0]);
+        let cover = boxed([0.0, 1.0, 0.0], [1.0, 1.06, 2.0]);
+        for solids in [vec![&skin], vec![&block, &cover]] {
+            let marks = vec![true; solids.len()];
+            let field = SignedDistance::from_meshes(solids.iter().copied(), &domain, 0.1);
+            let mut field = field.expect("closed").expect("a solid");
+            let before = field.clone();
+            thicken(
+                &mut field,
+                &solids,
+                &marks,
+                &domain,
+                Needed::Everywhere(0.15),
+            );
+            assert_eq!(field, before);
+        }
     }
 
     /// A skin on the floor or on a block has water on only one side. Two thin plates are thin, even
@@ -265,7 +475,7 @@ mod tests {
             max: DVec3::new(2.0, 2.0, 0.3),
         };
         let across = boxed([0.9, 0.0, 0.0], [0.98, 2.0, 0.3]);
-        assert!(thin_parts(&[&across], &domain, 0.1, 0.125)[0].is_some());
+        assert!(thin_parts(&[&across], &domain, 0.1, Needed::Everywhere(0.125))[0].is_some());
         let shell = |thickness: f64| {
             let outer = sphere(DVec3::ONE, 0.8, 48);
             let inner = sphere(DVec3::ONE, 0.8 - thickness, 48);

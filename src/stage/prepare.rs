@@ -7,6 +7,7 @@ use glam::DVec2;
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     boundary::{Boundary, Shape},
+    bounds::Bounds,
     cut_cell::volume_offset,
     mesh::TriangleMesh,
     particles::Particles,
@@ -14,6 +15,7 @@ use swell_domain::{
     shape::{ShapeField, ShapeSamples},
     signed_distance::{SignedDistance, SignedDistanceError},
     sources::Sources,
+    thin::{Needed, thicken},
 };
 use swell_scene::{
     ByMethod, Method, Scene, mesh_sequence::MeshSequence, moving_solid::MovingSolid,
@@ -79,16 +81,17 @@ impl Start {
     /// A mesh without an inside, or too large a distance grid.
     pub fn of(scene: &Scene) -> Result<Self, SignedDistanceError> {
         let spacing = scene.particle_spacing();
-        let boundary = boundary(scene)?;
-        // Moving solids displace the water of the start as well.
-        let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
+        let thin = Thin::of(scene);
+        let boundary = boundary(scene, &thin)?;
         let room = scene.start_domain();
         let fill = match scene.start_waves() {
-            Some(waves) => below(scene, &waves, meshes(scene).chain(movers))?,
+            Some(waves) => below(scene, &waves, &thin)?,
             None => {
+                // Moving solids displace the water of the start as well.
+                let all = thin.at_rest(scene).chain(thin.movers(scene));
                 let at_start = match scene.moving_solids[..] {
                     [] => None,
-                    _ => distance(scene, meshes(scene).chain(movers))?,
+                    _ => distance(scene, all, &thin)?,
                 };
                 fill_water(
                     &scene.start_blocks(),
@@ -139,7 +142,7 @@ impl Start {
             particles,
             removed: 0,
             asked: None,
-            boundary: boundary(scene)?,
+            boundary: boundary(scene, &Thin::of(scene))?,
             sources: scene.sources()?,
         })
     }
@@ -237,12 +240,13 @@ impl Start {
 
 /// The water below waves, outside of the solids at the start.
 fn below<'a>(
-    scene: &Scene,
+    scene: &'a Scene,
     waves: &'a StartWaves,
-    solids: impl Iterator<Item = &'a TriangleMesh> + Clone,
+    thin: &'a Thin,
 ) -> Result<Fill, SignedDistanceError> {
-    let solid = distance(scene, solids.clone())?;
-    let around = distance(scene, solids.chain([&waves.air]))?;
+    let solids = thin.at_rest(scene).chain(thin.movers(scene));
+    let solid = distance(scene, solids.clone(), thin)?;
+    let around = distance(scene, solids.chain([(&waves.air, false)]), thin)?;
     let floor = scene.domain.min;
     Ok(fill_below(
         |at| floor.y + waves.waves.surface(at - DVec2::new(floor.x, floor.z)),
@@ -257,9 +261,49 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> + Clone {
     scene.solids.iter().map(|solid| &solid.mesh)
 }
 
+/// Which solids are too thin somewhere and are thickened there.
+struct Thin {
+    at_rest: Vec<bool>,
+    moving: Vec<bool>,
+    /// Their thickness at least.
+    needed: Needed,
+}
+
+impl Thin {
+    fn of(scene: &Scene) -> Self {
+        let parts = scene.thin_solids();
+        let (at_rest, moving) = parts.split_at(scene.solids.len());
+        let moving = moving.iter().zip(&scene.moving_solids);
+        Self {
+            at_rest: at_rest.iter().map(Option::is_some).collect(),
+            moving: moving
+                .map(|(part, solid)| part.is_some() && solid.body.is_none())
+                .collect(),
+            needed: scene.needed_thickness(),
+        }
+    }
+
+    /// Solids at rest, and whether they are thickened.
+    fn at_rest<'a>(
+        &'a self,
+        scene: &'a Scene,
+    ) -> impl Iterator<Item = (&'a TriangleMesh, bool)> + Clone {
+        meshes(scene).zip(self.at_rest.iter().copied())
+    }
+
+    /// Moving solids where they begin, and whether they are thickened.
+    fn movers<'a>(
+        &'a self,
+        scene: &'a Scene,
+    ) -> impl Iterator<Item = (&'a TriangleMesh, bool)> + Clone {
+        let moving = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
+        moving.zip(self.moving.iter().copied())
+    }
+}
+
 /// Solids in the form that the solver needs.
-fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
-    let distance = distance(scene, meshes(scene))?;
+fn boundary(scene: &Scene, thin: &Thin) -> Result<Boundary, SignedDistanceError> {
+    let distance = distance(scene, thin.at_rest(scene), thin)?;
     let sampled = |mesh| samples(scene, mesh, distance.as_ref());
     let moving = scene
         .moving_solids
@@ -273,8 +317,8 @@ fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
         Method::Pbf => (meshes(scene).flat_map(sampled).collect(), moving.collect()),
         Method::Flip => (Vec::new(), Vec::new()),
     };
-    let shapes = shapes(scene)?;
-    let moving = moving_distances(scene, &shapes)?;
+    let shapes = shapes(scene, thin)?;
+    let moving = moving_distances(scene, &shapes, thin)?;
     Ok(Boundary {
         samples,
         distance,
@@ -302,9 +346,9 @@ fn offsets(scene: &Scene, moving: &[SignedDistance]) -> Vec<f64> {
 }
 
 /// The moving solids whose shape changes.
-fn shapes(scene: &Scene) -> Result<Vec<Option<Shape>>, SignedDistanceError> {
+fn shapes(scene: &Scene, thin: &Thin) -> Result<Vec<Option<Shape>>, SignedDistanceError> {
     let spacing = scene.particle_spacing();
-    let shape = |solid: &MovingSolid| {
+    let shape = |(solid, is_thin): (&MovingSolid, &bool)| {
         let Some(MeshSequence { shape, .. }) = &solid.sequence else {
             return Ok(None);
         };
@@ -313,12 +357,22 @@ fn shapes(scene: &Scene) -> Result<Vec<Option<Shape>>, SignedDistanceError> {
             Method::Flip => None,
         };
         Ok(Some(Shape {
-            field: ShapeField::new(shape, scene.solid_margin(), spacing)?,
+            field: ShapeField::new(
+                shape,
+                scene.solid_margin(),
+                spacing,
+                is_thin.then_some(thin.needed),
+            )?,
             samples,
         }))
     };
     match scene.sequences().next() {
-        Some(_) => scene.moving_solids.iter().map(shape).collect(),
+        Some(_) => scene
+            .moving_solids
+            .iter()
+            .zip(&thin.moving)
+            .map(shape)
+            .collect(),
         None => Ok(Vec::new()),
     }
 }
@@ -361,50 +415,71 @@ fn all_samples(scene: &Scene, mesh: &TriangleMesh) -> Vec<BoundarySample> {
     })
 }
 
-/// Signed distance to the union of meshes, as far as water can reach them.
+/// Signed distance to the union of meshes, as far as water can reach them, thickened where a solid
+/// that is marked so is thin.
 fn distance<'a>(
     scene: &Scene,
-    meshes: impl Iterator<Item = &'a TriangleMesh>,
+    meshes: impl Iterator<Item = (&'a TriangleMesh, bool)>,
+    thin: &Thin,
 ) -> Result<Option<SignedDistance>, SignedDistanceError> {
-    let meshes: Vec<_> = meshes
-        .flat_map(|mesh| scene.with_images(mesh, scene.solid_margin()))
-        .collect();
-    match scene.solid_grid(&meshes) {
-        Some((bounds, spacing)) => {
-            SignedDistance::from_meshes(meshes.iter().map(AsRef::as_ref), &bounds, spacing)
-        }
-        None => Ok(None),
+    let (images, is_thin): (Vec<_>, Vec<_>) = meshes
+        .flat_map(|(mesh, is_thin)| {
+            let images = scene.with_images(mesh, scene.solid_margin());
+            images.into_iter().map(move |image| (image, is_thin))
+        })
+        .unzip();
+    let Some((bounds, spacing)) = scene.solid_grid(&images) else {
+        return Ok(None);
+    };
+    let meshes: Vec<&TriangleMesh> = images.iter().map(AsRef::as_ref).collect();
+    let mut all = SignedDistance::from_meshes(meshes.iter().copied(), &bounds, spacing)?;
+    if let Some(field) = &mut all {
+        thicken(field, &meshes, &is_thin, &scene.domain, thin.needed);
     }
+    Ok(all)
 }
 
 /// The full signed distance of each moving solid: parts outside the domain may move in.
 fn moving_distances(
     scene: &Scene,
     shapes: &[Option<Shape>],
+    thin: &Thin,
 ) -> Result<Vec<SignedDistance>, SignedDistanceError> {
     let spacing = scene.particle_spacing();
     let solids = scene.moving_solids.iter().enumerate();
     let bounded = solids.filter_map(|(index, solid)| {
         let shape = shapes.get(index).and_then(Option::as_ref);
-        Some((&solid.placed.mesh, solid.placed.mesh.bounds()?, shape))
+        let mesh = &solid.placed.mesh;
+        Some((
+            mesh,
+            mesh.bounds()?,
+            shape,
+            solid.turns(),
+            thin.moving[index],
+        ))
     });
     bounded
-        .map(|(mesh, bounds, shape)| {
+        .map(|(mesh, bounds, shape, turns, is_thin)| {
             if let Some(shape) = shape {
                 return Ok(shape.field.at(0.0));
             }
             let mut bounds = bounds.grown(scene.solid_margin());
-            if !scene.is_periodic() {
-                return SignedDistance::from_mesh(mesh, &bounds, spacing);
-            }
             let reach = scene.domain.grown(scene.solid_margin());
             for axis in (0..3).filter(|&axis| scene.periodic[axis]) {
                 (bounds.min[axis], bounds.max[axis]) = (reach.min[axis], reach.max[axis]);
             }
             let images = scene.with_images(mesh, scene.solid_margin());
-            let images = images.iter().map(AsRef::as_ref);
-            let distance = SignedDistance::from_meshes(images, &bounds, spacing)?;
-            Ok(distance.expect("the mesh itself is among its images"))
+            let images: Vec<_> = images.iter().map(AsRef::as_ref).collect();
+            let distance = SignedDistance::from_meshes(images.iter().copied(), &bounds, spacing)?;
+            let mut field = distance.expect("the mesh itself is among its images");
+            // It may move anywhere, so that neither the domain nor other solids are beside it.
+            let marks = vec![is_thin; images.len()];
+            let needed = match turns {
+                true => Needed::Everywhere(thin.needed.most()),
+                false => thin.needed,
+            };
+            thicken(&mut field, &images, &marks, &Bounds::EVERYWHERE, needed);
+            Ok(field)
         })
         .collect()
 }

@@ -16,10 +16,12 @@ use glam::DVec3;
 
 use super::{
     super::{
+        bounds::Bounds,
         bvh::{Bvh, nearest_point},
         mesh::TriangleMesh,
         parallel,
         signed_distance::{SignedDistance, SignedDistanceError, grid_dims, sampled},
+        thin::{Needed, thicken},
     },
     Moment, ShapeSequence,
     samples::{nearest, weights},
@@ -47,6 +49,8 @@ struct Core {
     grid: SignedDistance,
     /// Number of parts of each interval between two meshes.
     parts: Vec<u32>,
+    /// Thickness up to which meshes are thickened.
+    needed: Option<Needed>,
     cache: Mutex<Cache>,
 }
 
@@ -85,7 +89,8 @@ pub struct ShapeStep {
 
 impl ShapeField {
     /// Prepares the distances to `sequence` on a grid with nodes `spacing` metres apart and
-    /// `margin` metres around all meshes.
+    /// `margin` metres around all meshes. Where a mesh is thinner than `needed`, if that is given, it
+    /// is [thickened](thicken).
     ///
     /// # Errors
     /// If the grid has too many nodes.
@@ -93,6 +98,7 @@ impl ShapeField {
         sequence: &ShapeSequence,
         margin: f64,
         spacing: f64,
+        needed: Option<Needed>,
     ) -> Result<Self, SignedDistanceError> {
         let bounds = sequence.bounds().grown(margin);
         let grid = SignedDistance {
@@ -111,6 +117,7 @@ impl ShapeField {
                 sequence: sequence.clone(),
                 grid,
                 parts: parts.collect(),
+                needed,
                 cache: Mutex::default(),
             }),
             way: DVec3::ZERO,
@@ -359,7 +366,12 @@ impl Core {
                 velocity(x, triangle, corners).as_vec3().to_array()
             },
         );
-        let (distance, velocity) = nodes.into_iter().unzip();
+        let (mut distance, velocity) = nodes.into_iter().unzip();
+        if let Some(needed) = self.needed {
+            let mut field = with_values(grid, distance);
+            thicken(&mut field, &[mesh], &[true], &Bounds::EVERYWHERE, needed);
+            distance = field.values;
+        }
         Nodes { distance, velocity }
     }
 }

@@ -1,6 +1,9 @@
 use std::f64::consts::PI;
 
-use super::super::mesh::tests::{box_mesh, sphere};
+use super::super::{
+    mesh::tests::{box_mesh, sphere},
+    thin::Needed,
+};
 use super::*;
 
 const RATE: f64 = 10.0;
@@ -45,7 +48,7 @@ fn vertices_move_evenly_between_two_meshes_and_rest_outside() {
 fn a_sliding_box_has_its_exact_distance_and_velocity_at_any_time() {
     let shape = slides();
     let spacing = 0.125;
-    let field = ShapeField::new(&shape, 0.5, spacing).expect("few nodes");
+    let field = ShapeField::new(&shape, 0.5, spacing, None).expect("few nodes");
     // From 0.53 s to 0.62 s it goes from 0.09 to 0.36.
     let step = field.step(0.53, 0.09);
     for (share, x) in [(0.0, 0.09), (1.0, 0.36)] {
@@ -91,7 +94,7 @@ fn a_thin_plate_is_whole_between_its_meshes() {
         })
     };
     let shape = ShapeSequence::new(vec![plate(0.0), plate(1.0)], 0.0, 1.0);
-    let field = ShapeField::new(&shape, 0.3, 0.1).expect("few nodes");
+    let field = ShapeField::new(&shape, 0.3, 0.1, None).expect("few nodes");
     for time in [0.0, 0.05, 0.33, 0.5, 0.77, 1.0] {
         let depth = field.at(time).sample(DVec3::new(time + 0.1, 0.5, 0.5));
         // At nodes 0.1 m apart the middle is at most half a spacing from one.
@@ -105,7 +108,7 @@ fn a_thin_plate_is_whole_between_its_meshes() {
 #[test]
 fn results_do_not_depend_on_what_was_asked_before() {
     let shape = slides();
-    let new = || ShapeField::new(&shape, 0.5, 0.125).expect("few nodes");
+    let new = || ShapeField::new(&shape, 0.5, 0.125, None).expect("few nodes");
     let times: Vec<f64> = (0..12).map(|k| 0.48 + 0.02 * f64::from(k)).collect();
     let field = new();
     for &time in times.iter().chain(times.iter().rev()) {
@@ -124,7 +127,7 @@ fn other_triangles_take_their_velocity_from_the_nearest_point() {
     for (rings, breaks) in [([24, 24], 0), ([24, 31], 1)] {
         let shape = grows(rings);
         assert_eq!(shape.breaks().count(), breaks, "{rings:?}");
-        let field = ShapeField::new(&shape, 0.3, 0.05).expect("few nodes");
+        let field = ShapeField::new(&shape, 0.3, 0.05, None).expect("few nodes");
         let step = field.step(0.25, 0.5);
         // Flat triangles are R (1 − cos(π/48)) below the sphere, twice that in a quad's middle.
         let sagitta = 2.0 * 0.7 * (1.0 - (PI / 48.0).cos());
@@ -208,4 +211,35 @@ fn stretched_triangles_get_more_samples() {
             assert!(least < 0.13, "{time} {k}: {least}");
         }
     }
+}
+
+/// A plate that is thin beside the nodes has nodes inside, wherever between them it stands, and its
+/// velocity. Negative control: as it is, it has none between two nodes.
+#[test]
+fn a_thin_plate_is_as_thick_as_asked_at_any_time() {
+    let plate = |way: f64| {
+        box_mesh(Bounds {
+            min: DVec3::new(way - 0.01, 0.0, 0.0),
+            max: DVec3::new(way + 0.01, 1.0, 1.0),
+        })
+    };
+    let shape = ShapeSequence::new([0.0, 0.3].map(plate).to_vec(), 0.0, RATE);
+    let field = |least| ShapeField::new(&shape, 0.5, 0.125, least).expect("few nodes");
+    let (thick, as_is) = (field(Some(Needed::Everywhere(0.19))), field(None));
+    let mut open = 0;
+    for k in 0..10 {
+        let time = 0.01 * f64::from(k);
+        let middle = DVec3::new(3.0 * time, 0.5, 0.5);
+        // Halfway between two nodes the mean of theirs, each off by less than their difference.
+        let inside = thick.at(time).sample(middle);
+        assert!((-0.095 - 1e-6..0.0).contains(&inside), "{time}: {inside}");
+        open += usize::from(as_is.at(time).sample(middle) > 0.0);
+        // A node within a quarter of a spacing beyond the middle is as far off it as one before.
+        let beside = middle + DVec3::new(0.15, 0.0, 0.0);
+        let off = thick.at(time).sample(beside) - 0.055;
+        assert!(off.abs() < 0.03, "{time}: {off}");
+    }
+    assert!(open > 5, "{open}");
+    let step = thick.step(0.0, 0.05);
+    assert!((step.fastest - 3.0).abs() < 1e-6, "{}", step.fastest);
 }

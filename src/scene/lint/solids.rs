@@ -1,12 +1,20 @@
 //! Warnings for solids too thin to hold water, and for bodies too small to float as they should.
 
-use swell_domain::{mesh::TriangleMesh, thin::thin_parts};
+use glam::DVec3;
 
-use crate::{PlacedMesh, Scene};
+use swell_domain::{
+    mesh::TriangleMesh,
+    thin::{Needed, ThinPart, thin_parts},
+};
+
+use crate::{ByMethod, PlacedMesh, Scene};
 
 /// Least thickness of a solid, in spacings of the distance grid. A solid thinner than one spacing
 /// can lie between two nodes; the additional half is for oblique and moving solids.
 const LEAST_THICKNESS: f64 = 1.5;
+
+/// Extent of a cell along its diagonal, edges.
+const MOST_OBLIQUE: f64 = 1.73;
 
 /// Least size of a body, cells of the projection's grid: edge of a cube with its volume. Cells cut
 /// by planes make smaller ones float a tenth of that too high or too low.
@@ -37,27 +45,59 @@ impl Scene {
         ));
     }
 
-    /// Warns about solids that are too thin somewhere, with water or air on both sides.
-    pub(super) fn lint_thin(&self, lints: &mut Vec<String>) {
-        let spacing = self.particle_spacing();
+    /// Returns the thickness that a wall needs to hold water back: that of no cell of the
+    /// projection's grid which is open on both sides, and not less than what the distances resolve.
+    pub fn needed_thickness(&self) -> Needed {
         let at_rest = self.solids.iter();
         let images = at_rest.flat_map(|it| self.with_images(&it.mesh, self.solid_margin()));
         let nodes = self.solid_grid(&images.collect::<Vec<_>>());
-        let least = LEAST_THICKNESS * nodes.map_or(spacing, |(_, spacing)| spacing);
-        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
-        let all: Vec<&PlacedMesh> = self.solids.iter().chain(moving).collect();
-        let meshes: Vec<&TriangleMesh> = all.iter().map(|placed| &placed.mesh).collect();
-        let found = thin_parts(&meshes, &self.domain, spacing, least);
-        for (placed, thin) in all.into_iter().zip(found) {
+        let spacing = nodes.map_or(self.particle_spacing(), |(_, spacing)| spacing);
+        let least = LEAST_THICKNESS * spacing;
+        match self.by_method() {
+            ByMethod::Pbf(scene) if scene.of_projection().is_none() => Needed::Everywhere(least),
+            _ => Needed::OfCells {
+                cell: self.solver.cell_size(),
+                least,
+            },
+        }
+    }
+
+    /// Returns the thinnest part of each solid, first those at rest, then those that move, that is
+    /// thinner than [needed](Self::needed_thickness), with water or air on both sides.
+    pub fn thin_solids(&self) -> Vec<Option<ThinPart>> {
+        let spacing = self.particle_spacing();
+        let meshes: Vec<&TriangleMesh> = self.placed().map(|(placed, _)| &placed.mesh).collect();
+        thin_parts(&meshes, &self.domain, spacing, self.needed_thickness())
+    }
+
+    /// All solids, and whether they are thickened where they are thin: bodies displace the water of
+    /// their volume.
+    fn placed(&self) -> impl Iterator<Item = (&PlacedMesh, bool)> {
+        let moving = self.moving_solids.iter();
+        let moving = moving.map(|solid| (&solid.placed, solid.body.is_none()));
+        self.solids
+            .iter()
+            .map(|placed| (placed, true))
+            .chain(moving)
+    }
+
+    /// Warns about solids that are too thin somewhere, with water or air on both sides.
+    pub(super) fn lint_thin(&self, lints: &mut Vec<String>) {
+        let least = self.needed_thickness().along(DVec3::X);
+        for ((placed, is_thickened), thin) in self.placed().zip(self.thin_solids()) {
             let Some(thin) = thin else {
                 continue;
             };
             // World coordinates, as in the scene file.
             let place = self.origin + thin.place;
+            let what = match is_thickened {
+                true => "for the water it is thickened",
+                false => "water passes through it",
+            };
             lints.push(format!(
-                "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes \
-                 through what is thinner than {least:.4} m, {LEAST_THICKNESS} times the spacing of \
-                 the grid of distances to solids",
+                "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); {what}: to hold \
+                 water back a wall is {least:.4} m thick, and up to {MOST_OBLIQUE} times that at an \
+                 angle to the grid",
                 placed.name(),
                 thin.thickness,
                 place.x,

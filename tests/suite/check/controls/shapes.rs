@@ -37,7 +37,7 @@ pub fn shape(scene: &mut Scene, start: &mut Start) {
     let mut solid = mover(meshes[0].bounds().unwrap(), DVec3::X, Motion::Still);
     let room = meshes[0].bounds().unwrap().grown(0.01);
     let shape = ShapeSequence::new(meshes, 0.0, 20.0);
-    let field = ShapeField::new(&shape, 4.0 * D, D).unwrap();
+    let field = ShapeField::new(&shape, 4.0 * D, D, None).unwrap();
     solid.slide = None;
     solid.sequence = Some(MeshSequence {
         shape,
