@@ -434,7 +434,7 @@ fn distance<'a>(
     let meshes: Vec<&TriangleMesh> = images.iter().map(AsRef::as_ref).collect();
     let mut all = SignedDistance::from_meshes(meshes.iter().copied(), &bounds, spacing)?;
     if let Some(field) = &mut all {
-        thicken(field, &meshes, &is_thin, &scene.domain, thin.needed);
+        thicken(field, &meshes, &is_thin, &scene.walled(), thin.needed);
     }
     Ok(all)
 }

@@ -15,11 +15,11 @@ fn a_thin_wall_is_told_with_its_place_and_the_thickness_it_needs() {
     assert_eq!(found.len(), 1, "{found:?}");
     for part in [
         "solid.mesh of box: it is 0.0500 m thick at (0.825, ",
-        "0.1500 m, 1.5 times",
+        "must be 0.2000 m thick, and up to 1.73 times",
     ] {
         assert!(found[0].contains(part), "{part} of {found:?}");
     }
-    assert_eq!(lints(&["solid[0].scale=[0.151,1.6,1.0]"]), [] as [&str; 0]);
+    assert_eq!(lints(&["solid[0].scale=[0.201,1.6,1.0]"]), [] as [&str; 0]);
     // With a moving wall before it in the file, and everything a kilometre away.
     let moving = "motion={kind=\"constant_velocity\",velocity=0.1,until=0.1},direction=[1,0,0]";
     let wall = "mesh=\"box.obj\",scale=[0.05,1.6,1.0]";

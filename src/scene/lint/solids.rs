@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use swell_domain::{
+    bounds::Bounds,
     mesh::TriangleMesh,
     thin::{Needed, ThinPart, thin_parts},
 };
@@ -62,12 +63,27 @@ impl Scene {
         }
     }
 
+    /// Returns the domain, without ends along its periodic axes.
+    pub fn walled(&self) -> Bounds {
+        let mut room = self.domain;
+        for axis in (0..3).filter(|&axis| self.periodic[axis]) {
+            (room.min[axis], room.max[axis]) = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        room
+    }
+
     /// Returns the thinnest part of each solid, first those at rest, then those that move, that is
     /// thinner than [needed](Self::needed_thickness), with water or air on both sides.
     pub fn thin_solids(&self) -> Vec<Option<ThinPart>> {
-        let spacing = self.particle_spacing();
+        let (spacing, needed) = (self.particle_spacing(), self.needed_thickness());
+        let room = self.walled();
         let meshes: Vec<&TriangleMesh> = self.placed().map(|(placed, _)| &placed.mesh).collect();
-        thin_parts(&meshes, &self.domain, spacing, self.needed_thickness())
+        let mut found = thin_parts(&meshes, &room, spacing, needed);
+        // What moves may begin at a wall or in another solid.
+        for (mesh, part) in meshes.iter().zip(&mut found).skip(self.solids.len()) {
+            *part = part.or_else(|| thin_parts(&[mesh], &Bounds::EVERYWHERE, spacing, needed)[0]);
+        }
+        found
     }
 
     /// All solids, and whether they are thickened where they are thin: bodies displace the water of
@@ -96,8 +112,8 @@ impl Scene {
             };
             lints.push(format!(
                 "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); {what}: to hold \
-                 water back a wall is {least:.4} m thick, and up to {MOST_OBLIQUE} times that at an \
-                 angle to the grid",
+                 water back a wall must be {least:.4} m thick, and up to {MOST_OBLIQUE} times that \
+                 at an angle to the grid",
                 placed.name(),
                 thin.thickness,
                 place.x,
