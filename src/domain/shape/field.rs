@@ -89,8 +89,8 @@ pub struct ShapeStep {
 
 impl ShapeField {
     /// Prepares the distances to `sequence` on a grid with nodes `spacing` metres apart and
-    /// `margin` metres around all meshes. Where a mesh is thinner than `needed`, if that is given, it
-    /// is [thickened](thicken).
+    /// `margin` metres around all meshes. Where a mesh is thinner than `needed`, if that is given,
+    /// it is [thickened](thicken).
     ///
     /// # Errors
     /// If the grid has too many nodes.
