@@ -99,7 +99,12 @@ fn tell(progress: &Progress, event: &WetEvent) {
             settings: [drying, contact, edge],
             first,
             last,
+            warnings,
         } => {
+            for warning in warnings {
+                let (text, json) = super::bake::warned(warning);
+                progress.say(&text, json);
+            }
             let frames = u64::from((last + 1).saturating_sub(*first));
             progress.begin(frames);
             progress.say(

@@ -100,14 +100,7 @@ pub fn thin_parts(
     needed: Needed,
 ) -> Vec<Option<ThinPart>> {
     let trees: Vec<Bvh> = solids.iter().map(|mesh| Bvh::new(mesh)).collect();
-    let all = Solids {
-        meshes: solids,
-        trees: &trees,
-        domain,
-        spacing,
-        needed,
-        least: needed.most(),
-    };
+    let all = Solids::new(solids, &trees, (domain, spacing), needed);
     let thinnest = |mesh: &&TriangleMesh| {
         let points = spread(mesh, domain, spacing, MOST_RAYS);
         let mut parts: Vec<(ThinPart, DVec3)> = parallel::flat_map(0..points.len(), |k| {
@@ -143,14 +136,7 @@ pub fn thicken(
     }
     let trees: Vec<Bvh> = solids.iter().map(|mesh| Bvh::new(mesh)).collect();
     let (origin, spacing, dims) = (field.origin, field.spacing, field.dims);
-    let all = Solids {
-        meshes: solids,
-        trees: &trees,
-        domain,
-        spacing,
-        needed,
-        least: needed.most(),
-    };
+    let all = Solids::new(solids, &trees, (domain, spacing), needed);
     let reach = 0.5 * needed.most() + NEAR * spacing;
     let mut near: HashMap<[i64; 3], Vec<Plate>> = HashMap::new();
     for (mesh, _) in solids.iter().zip(is_thin).filter(|(_, is_thin)| **is_thin) {
@@ -172,7 +158,8 @@ pub fn thicken(
     }
     parallel::for_chunks_mut(&mut field.values, dims[0], |row, values| {
         let (j, k) = (row % dims[1], row / dims[1]);
-        for (i, value) in values.iter_mut().enumerate() {
+        let is_near = |value: &f32| f64::from(value.abs()) < reach;
+        for (i, value) in values.iter_mut().enumerate().filter(|(_, it)| is_near(it)) {
             let x = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
             let [a, b, c] = room(x, reach);
             let rooms = (0..27).map(|n| [a + n % 3 - 1, b + n / 3 % 3 - 1, c + n / 9 - 1]);
@@ -220,10 +207,26 @@ struct Solids<'a> {
     spacing: f64,
     needed: Needed,
     /// The largest thickness that is needed, metres.
-    least: f64,
+    most: f64,
 }
 
-impl Solids<'_> {
+impl<'a> Solids<'a> {
+    fn new(
+        meshes: &'a [&'a TriangleMesh],
+        trees: &'a [Bvh],
+        (domain, spacing): (&'a Bounds, f64),
+        needed: Needed,
+    ) -> Self {
+        Self {
+            meshes,
+            trees,
+            domain,
+            spacing,
+            needed,
+            most: needed.most(),
+        }
+    }
+
     fn is_solid(&self, p: DVec3) -> bool {
         (self.trees.iter()).any(|tree| tree.winding_number(p).abs() > 0.5)
     }
@@ -254,11 +257,11 @@ impl Solids<'_> {
         if !is_within(-apart) {
             return None;
         }
-        let skipped = 1e-6 * self.least;
+        let skipped = 1e-6 * self.most;
         let (mut way, mut thickness) = (0.0, None);
         loop {
             let from = p - (way + skipped) * normal;
-            let (further, other) = self.next(from, -normal, self.least)?;
+            let (further, other) = self.next(from, -normal, self.most)?;
             way += skipped + further;
             let thickness = *thickness.get_or_insert(way);
             if other.dot(normal) < OPPOSITE && !self.is_solid(p - (way + beside) * normal) {
@@ -269,7 +272,7 @@ impl Solids<'_> {
                     && !self.is_solid(p + beside * normal);
                 return is_thin.then_some(ThinPart { place, thickness });
             }
-            if way > 4.0 * self.least {
+            if way > 4.0 * self.most {
                 return None;
             }
         }
@@ -289,7 +292,7 @@ impl Solids<'_> {
             .collect();
         let suffice = |count: usize, part: f64| count as f64 >= part * layers.len() as f64;
         let thin = || {
-            let is_thin = |layer: f64| layer < 2.0 * self.least;
+            let is_thin = |layer: f64| layer < 2.0 * self.needed.along(normal);
             layers.iter().filter(move |(_, it)| it.is_some_and(is_thin))
         };
         // Rays are cheap beside winding numbers, and few places pass this test.

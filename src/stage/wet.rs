@@ -104,6 +104,8 @@ pub enum WetEvent {
         first: u32,
         /// Last frame that will be computed.
         last: u32,
+        /// What of the surfaces stays dry although water stands at it.
+        warnings: Vec<String>,
     },
     /// A frame was computed.
     Frame {
@@ -222,6 +224,7 @@ pub fn wet(
         settings: [drying_s, contact_m, edge_m],
         first: writer.clock.frame + 1,
         last,
+        warnings: out_of_reach(&scene, contact_m),
     });
     let areas = made.areas();
     let mut interrupted = false;
@@ -257,6 +260,25 @@ pub fn wet(
         directory,
         interrupted,
     })
+}
+
+/// Warns of solids that are thickened so much that water at them is not within `contact` metres of
+/// their mesh.
+fn out_of_reach(scene: &Scene, contact: f64) -> Vec<String> {
+    let most = scene.needed_thickness().most();
+    let thickened = scene.thickened_solids();
+    let least = thickened.map(|(placed, part)| {
+        let least = 0.5 * (most - part.thickness) + CONTACT * scene.particle_spacing();
+        (placed.name(), least)
+    });
+    let missed = least.filter(|(_, least)| contact < *least);
+    let warning = missed.map(|(name, least)| {
+        format!(
+            "{name} is thickened for the water, which may stand up to {least:.3} m off its mesh: \
+             within {contact:.3} m it stays dry"
+        )
+    });
+    warning.collect()
 }
 
 /// Opens the bake, and determines the last frame to make.

@@ -15,7 +15,7 @@ fn a_thin_wall_is_told_with_its_place_and_the_thickness_it_needs() {
     assert_eq!(found.len(), 1, "{found:?}");
     for part in [
         "solid.mesh of box: it is 0.0500 m thick at (0.825, ",
-        "must be 0.2000 m thick, and up to 1.73 times",
+        "must be 0.2000 m thick, and up to 0.3464 m at an angle",
     ] {
         assert!(found[0].contains(part), "{part} of {found:?}");
     }

@@ -14,9 +14,6 @@ use crate::{ByMethod, PlacedMesh, Scene};
 /// can lie between two nodes; the additional half is for oblique and moving solids.
 const LEAST_THICKNESS: f64 = 1.5;
 
-/// Extent of a cell along its diagonal, edges.
-const MOST_OBLIQUE: f64 = 1.73;
-
 /// Least size of a body, cells of the projection's grid: edge of a cube with its volume. Cells cut
 /// by planes make smaller ones float a tenth of that too high or too low.
 const LEAST_BODY: f64 = 2.0;
@@ -46,8 +43,8 @@ impl Scene {
         ));
     }
 
-    /// Returns the thickness that a wall needs to hold water back: that of no cell of the
-    /// projection's grid which is open on both sides, and not less than what the distances resolve.
+    /// Returns the thickness that a wall needs to hold water back: the extent of a cell of the
+    /// projection's grid along its normal, and not less than what the grid of distances resolves.
     pub fn needed_thickness(&self) -> Needed {
         let at_rest = self.solids.iter();
         let images = at_rest.flat_map(|it| self.with_images(&it.mesh, self.solid_margin()));
@@ -86,6 +83,14 @@ impl Scene {
         found
     }
 
+    /// Returns the solids that are thickened, each with its thinnest part.
+    pub fn thickened_solids(&self) -> impl Iterator<Item = (&PlacedMesh, ThinPart)> {
+        let thin = self.placed().zip(self.thin_solids());
+        thin.filter_map(|((placed, is_thickened), part)| {
+            Some((placed, part.filter(|_| is_thickened)?))
+        })
+    }
+
     /// All solids, and whether they are thickened where they are thin: bodies displace the water of
     /// their volume.
     fn placed(&self) -> impl Iterator<Item = (&PlacedMesh, bool)> {
@@ -99,7 +104,8 @@ impl Scene {
 
     /// Warns about solids that are too thin somewhere, with water or air on both sides.
     pub(super) fn lint_thin(&self, lints: &mut Vec<String>) {
-        let least = self.needed_thickness().along(DVec3::X);
+        let needed = self.needed_thickness();
+        let [least, most] = [needed.along(DVec3::X), needed.most()];
         for ((placed, is_thickened), thin) in self.placed().zip(self.thin_solids()) {
             let Some(thin) = thin else {
                 continue;
@@ -112,8 +118,8 @@ impl Scene {
             };
             lints.push(format!(
                 "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); {what}: to hold \
-                 water back a wall must be {least:.4} m thick, and up to {MOST_OBLIQUE} times that \
-                 at an angle to the grid",
+                 water back a wall must be {least:.4} m thick, and up to {most:.4} m at an angle to \
+                 the grid",
                 placed.name(),
                 thin.thickness,
                 place.x,

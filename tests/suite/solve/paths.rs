@@ -64,8 +64,7 @@ fn squeezed(opened: &Opened) -> f64 {
 const SUM: f64 = 60.0 * 0.5 * f32::EPSILON as f64;
 
 /// What flows into cells of a closed box because straight paths contract their water flows out of
-/// others. Control: not
-/// where walls and the block bound or cut cells.
+/// others. Control: not where walls and the block bound or cut cells.
 #[test]
 fn water_in_a_closed_box_is_not_squeezed() {
     let gpu = on(&context());

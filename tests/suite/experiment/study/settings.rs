@@ -101,13 +101,8 @@ name = "multigrid"
 "#;
     job.run(text, false).unwrap();
     let [pressure, velocity] = ["pressure_error", "velocity_error"].map(|error| job.numbers(error));
-    // Pressures are stored in f32: what remains of two words is the rounding, an error that is
-    // uniform in ± 2⁻²⁵ of a number in [½, 1).
-    let rounding = 0.5 * f64::from(f32::EPSILON) / 2.0 / 3f64.sqrt();
-    assert!(
-        pressure[0] > 1.5 * rounding && pressure[1] < rounding,
-        "{pressure:?}"
-    );
+    // After 1 to 12 steps two words are 2.4 to 3.6 times as good as one (lavapipe).
+    assert!(pressure[0] > 2.0 * pressure[1], "{pressure:?}");
     // ‖x − x64‖ ≤ κ 1e-12; κ of six cells is below 100.
     assert!(
         pressure[1] > 1e3 * pressure[2] && pressure[2] < 1e-10,
