@@ -118,8 +118,8 @@ impl Scene {
             };
             lints.push(format!(
                 "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); {what}: to hold \
-                 water back a wall must be {least:.4} m thick, and up to {most:.4} m at an angle to \
-                 the grid",
+                 water back a wall must be {least:.4} m thick, and up to {most:.4} m at an angle \
+                 to the grid",
                 placed.name(),
                 thin.thickness,
                 place.x,
