@@ -44,10 +44,14 @@ pub(super) fn water(volume: Volume) -> String {
 
 /// What a solid whose shape changes takes.
 pub(super) fn shape(cost: &ShapeCost) -> String {
+    let from = match cost.files {
+        0 => "moves with the waves".to_owned(),
+        files => count(files as u64, "mesh file"),
+    };
     format!(
-        "{}: {}; distances at {}, {} on the device and {} in memory, sampled again {} in the shot",
+        "{}: {from}; distances at {}, {} on the device and {} in memory, sampled again {} in the \
+         shot",
         cost.name,
-        count(cost.files as u64, "mesh file"),
         count(cost.nodes as u64, "node"),
         size(cost.device_bytes() as u64),
         size(cost.bytes as u64),

@@ -26,7 +26,7 @@ impl SceneContacts {
         let (mut moving, mut bodies) = (Vec::new(), Vec::new());
         for solid in &scene.moving_solids {
             match &solid.body {
-                None if solid.sequence.is_some() => {}
+                None if solid.changes_shape() => {}
                 None => moving.push(&solid.placed.mesh),
                 Some(it) => bodies.push((&it.body, it.collides.then_some(&solid.placed.mesh))),
             }
@@ -49,7 +49,7 @@ impl SceneContacts {
     ) {
         let Substep { start, length, .. } = *substep;
         let prescribed = scene.moving_solids.iter().filter(|it| it.is_prescribed());
-        let prescribed = prescribed.filter(|it| it.sequence.is_none());
+        let prescribed = prescribed.filter(|it| !it.changes_shape());
         let moving: Vec<Passage> = prescribed
             .map(|solid| solid.passage(&[], start, length))
             .collect();

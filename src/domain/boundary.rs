@@ -5,7 +5,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use super::{
     sampling::BoundarySample,
-    shape::{ShapeField, ShapeSamples},
+    shape::{ShapeField, SurfaceSamples},
     signed_distance::SignedDistance,
 };
 
@@ -36,7 +36,7 @@ pub struct Shape {
     /// Distances and velocities of its surface.
     pub field: ShapeField,
     /// Samples of its surface; `None` where the solver takes no samples.
-    pub samples: Option<Arc<ShapeSamples>>,
+    pub samples: Option<Arc<dyn SurfaceSamples>>,
 }
 
 impl Boundary {

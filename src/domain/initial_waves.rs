@@ -24,11 +24,11 @@ pub enum InitialWave {
 }
 
 impl InitialWave {
-    /// Returns the depth of still water, metres.
-    pub fn depth(&self) -> f64 {
+    /// Returns the height of still water above the domain's floor, metres.
+    pub fn level(&self) -> f64 {
         match self {
             Self::Solitary { wave, .. } => wave.depth,
-            Self::Open(waves) => waves.depth(),
+            Self::Open(waves) => waves.level(),
         }
     }
 
@@ -59,24 +59,24 @@ impl InitialWave {
     }
 }
 
-/// Waves on water of one depth; elevations and velocities add up.
+/// Waves on water of one level; elevations and velocities add up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitialWaves {
     waves: Vec<InitialWave>,
-    depth: f64,
+    level: f64,
 }
 
 impl InitialWaves {
-    /// The sum of some waves; `None` without any, or if their depths differ.
+    /// The sum of some waves; `None` without any, or if their levels differ.
     pub fn new(waves: Vec<InitialWave>) -> Option<Self> {
-        let depth = waves.first()?.depth();
-        let is_one = waves.iter().all(|wave| wave.depth() == depth);
-        is_one.then_some(Self { waves, depth })
+        let level = waves.first()?.level();
+        let is_one = waves.iter().all(|wave| wave.level() == level);
+        is_one.then_some(Self { waves, level })
     }
 
     /// Returns the height of the surface above the floor, metres.
     pub fn surface(&self, at: DVec2) -> f64 {
-        self.depth
+        self.level
             + self
                 .waves
                 .iter()
@@ -146,36 +146,7 @@ impl WaveSurface {
     /// Returns the closed mesh of the air above the surface, up to `top` metres in the world, which
     /// lies above it.
     pub fn air(&self, top: f64) -> TriangleMesh {
-        let layer = self.points.len() as u32;
-        let lid = self.points.iter().map(|p| DVec3::new(p.x, top, p.z));
-        let vertices = self.points.iter().copied().chain(lid).collect();
-        let [nx, nz] = self.counts;
-        let row = nx + 1;
-        let mut triangles = Vec::new();
-        let mut quad = |[a, b, c, d]: [u32; 4]| triangles.extend([[a, b, c], [a, c, d]]);
-        for k in 0..nz {
-            for i in 0..nx {
-                let a = k * row + i;
-                // Seen from below and from above.
-                quad([a, a + 1, a + 1 + row, a + row]);
-                let a = a + layer;
-                quad([a, a + row, a + 1 + row, a + 1]);
-            }
-        }
-        // Sides, from the corner of two neighbours on the rim.
-        let mut side = |a: u32, b: u32| quad([a, a + layer, b + layer, b]);
-        for i in 0..nx {
-            side(i, i + 1);
-            side(nz * row + i + 1, nz * row + i);
-        }
-        for k in 0..nz {
-            side((k + 1) * row, k * row);
-            side(k * row + nx, (k + 1) * row + nx);
-        }
-        TriangleMesh {
-            vertices,
-            triangles,
-        }
+        TriangleMesh::between_sheets(self.points.clone(), self.counts, top)
     }
 }
 

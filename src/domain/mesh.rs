@@ -17,6 +17,41 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
+    /// Returns the closed mesh between a sheet and the plane y = `top` above it. `points` are the
+    /// sheet's, x fastest, of `counts` squares along x and z.
+    pub fn between_sheets(points: Vec<DVec3>, counts: [u32; 2], top: f64) -> Self {
+        let layer = points.len() as u32;
+        let lid: Vec<_> = points.iter().map(|p| DVec3::new(p.x, top, p.z)).collect();
+        let vertices = points.into_iter().chain(lid).collect();
+        let [nx, nz] = counts;
+        let row = nx + 1;
+        let mut triangles = Vec::new();
+        let mut quad = |[a, b, c, d]: [u32; 4]| triangles.extend([[a, b, c], [a, c, d]]);
+        for k in 0..nz {
+            for i in 0..nx {
+                let a = k * row + i;
+                // Seen from below and from above.
+                quad([a, a + 1, a + 1 + row, a + row]);
+                let a = a + layer;
+                quad([a, a + row, a + 1 + row, a + 1]);
+            }
+        }
+        // Sides, from the corner of two neighbours on the rim.
+        let mut side = |a: u32, b: u32| quad([a, a + layer, b + layer, b]);
+        for i in 0..nx {
+            side(i, i + 1);
+            side(nz * row + i + 1, nz * row + i);
+        }
+        for k in 0..nz {
+            side((k + 1) * row, k * row);
+            side(k * row + nx, (k + 1) * row + nx);
+        }
+        Self {
+            vertices,
+            triangles,
+        }
+    }
+
     /// Returns the corners of triangle `index`, metres.
     pub fn corners(&self, index: usize) -> [DVec3; 3] {
         self.triangles[index].map(|v| self.vertices[v as usize])

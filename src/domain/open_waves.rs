@@ -102,7 +102,7 @@ impl WaveComponent {
 }
 
 /// Waves on water of constant depth. Positions are metres from the domain's least corner, with x
-/// and z horizontal and y upward from the floor.
+/// and z horizontal and y upward. The domain's floor is that of the water, or cuts it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenWaves {
     /// All waves of the sum.
@@ -110,6 +110,8 @@ pub struct OpenWaves {
     /// Period of regular waves, seconds; `None` for a sea.
     pub period: Option<f64>,
     depth: f64,
+    /// Height of still water above the domain's floor, metres.
+    level: f64,
     ramp: f64,
 }
 
@@ -134,6 +136,7 @@ impl OpenWaves {
             lines: vec![first, second],
             period: Some(waves.period),
             depth: waves.depth,
+            level: waves.depth,
             ramp: waves.ramp,
         }
     }
@@ -171,8 +174,15 @@ impl OpenWaves {
             lines: lines.collect(),
             period: None,
             depth: asked.depth,
+            level: asked.depth,
             ramp: asked.ramp,
         }
+    }
+
+    /// Cuts the water at the domain's floor, `level` metres below still water.
+    #[must_use]
+    pub fn above(self, level: f64) -> Self {
+        Self { level, ..self }
     }
 
     /// Returns the ramp's fraction of the full height at time `t`, seconds.
@@ -184,24 +194,63 @@ impl OpenWaves {
     /// still level.
     pub fn velocity(&self, place: DVec3, t: f64) -> DVec3 {
         let at = DVec2::new(place.x, place.z);
-        let y = place.y.clamp(0.0, self.depth);
         let of = |line: &WaveComponent| {
-            let k = line.number.length();
+            let [cosh, sinh] = self.profile(line, place.y);
             let (sin, cos) = line.angle(at, t).sin_cos();
-            // cosh ky / cosh kh and sinh ky / cosh kh.
-            let (up, down) = ((k * (y - self.depth)).exp(), (-k * (y + self.depth)).exp());
-            let whole = 1.0 + (-2.0 * k * self.depth).exp();
-            let along = line.number / k * (line.speed * cos * (up + down) / whole);
-            let upward = line.speed * sin * (up - down) / whole;
-            DVec3::new(along.x, upward, along.y)
+            let along = line.number / line.number.length() * (line.speed * cos * cosh);
+            DVec3::new(along.x, line.speed * sin * sinh, along.y)
         };
         self.grown(t) * self.lines.iter().map(of).sum::<DVec3>()
+    }
+
+    /// Returns cosh kY / cosh kh and sinh kY / cosh kh, where Y is the height above the water's
+    /// floor of `y`, at most that of still water.
+    fn profile(&self, line: &WaveComponent, y: f64) -> [f64; 2] {
+        let k = line.number.length();
+        let below = y.clamp(0.0, self.level) - self.level;
+        let up = (k * below).exp();
+        let down = (-k * (below + 2.0 * self.depth)).exp();
+        let whole = 1.0 + (-2.0 * k * self.depth).exp();
+        [(up + down) / whole, (up - down) / whole]
+    }
+
+    /// Amplitude of the vertical displacement of the water of mean height `y`, metres: that of
+    /// ∫ v dt.
+    fn amplitude(&self, line: &WaveComponent, y: f64) -> f64 {
+        let [_, sinh] = self.profile(line, y);
+        line.speed / line.frequency * sinh
+    }
+
+    /// Returns an upper bound on how far water of mean height `y` is above or below it, metres.
+    pub fn most_displacement(&self, y: f64) -> f64 {
+        let amplitudes = self.lines.iter().map(|line| self.amplitude(line, y).abs());
+        amplitudes.sum()
+    }
+
+    /// Returns waves whose elevation is how far water of mean height `y` is above it, without those
+    /// that move it by less than `least` metres.
+    #[must_use]
+    pub fn layer(&self, y: f64, least: f64) -> Self {
+        let lines = self.lines.iter().map(|line| WaveComponent {
+            elevation: self.amplitude(line, y),
+            ..*line
+        });
+        Self {
+            lines: lines.filter(|line| line.elevation.abs() >= least).collect(),
+            ..self.clone()
+        }
     }
 
     /// Returns the surface elevation above still water at x and z, metres.
     pub fn elevation(&self, at: DVec2, t: f64) -> f64 {
         let of = |line: &WaveComponent| line.elevation * line.angle(at, t).cos();
         self.grown(t) * self.lines.iter().map(of).sum::<f64>()
+    }
+
+    /// Returns the slope of the surface at x and z along both.
+    pub fn slope(&self, at: DVec2, t: f64) -> DVec2 {
+        let of = |line: &WaveComponent| -line.elevation * line.angle(at, t).sin() * line.number;
+        self.grown(t) * self.lines.iter().map(of).sum::<DVec2>()
     }
 
     /// Returns the time until the full height, seconds.
@@ -212,6 +261,11 @@ impl OpenWaves {
     /// Returns the depth of still water, metres.
     pub fn depth(&self) -> f64 {
         self.depth
+    }
+
+    /// Returns the height of still water above the domain's floor, metres.
+    pub fn level(&self) -> f64 {
+        self.level
     }
 
     /// Returns the length of the shortest waves, metres.

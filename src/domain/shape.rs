@@ -5,6 +5,8 @@
 //! later surface then comes from the point of the earlier one that is nearest to it.
 
 mod field;
+mod floor;
+mod meshes;
 mod samples;
 
 use std::sync::Arc;
@@ -16,7 +18,8 @@ use super::{
 };
 
 pub use field::{ShapeField, ShapeStep};
-pub use samples::{ShapeSamples, SurfacePoint};
+pub use floor::{FloorSamples, WaveFloor};
+pub use samples::{ShapeSamples, SurfacePoint, SurfaceSamples};
 
 /// A time nearer than this to a mesh's own is that, in intervals between meshes.
 const SAME: f64 = 1e-6;

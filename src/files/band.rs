@@ -58,8 +58,9 @@ pub(super) fn check(doc: &Document<'_>, scene: &Scene) -> Result<(), SceneError>
         ("transfer = \"apic\"", flip.transfer == Transfer::Apic),
         (
             "[[solid]] and [[body]]",
-            !scene.solids.is_empty() || !scene.moving_solids.is_empty(),
+            !scene.solids.is_empty() || scene.drawn_movers().next().is_some(),
         ),
+        ("simulated_depth", !scene.moving_solids.is_empty()),
         ("[[wave_maker]]", !scene.wave_makers.is_empty()),
         ("[[emitter]]", !scene.emitters.is_empty()),
         ("[[drain]]", !scene.drains.is_empty()),

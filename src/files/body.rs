@@ -95,6 +95,7 @@ pub(super) fn build(
         track: None,
         sequence: None,
         body: Some(free),
+        floor: None,
     })
 }
 

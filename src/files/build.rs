@@ -15,7 +15,7 @@ use super::{
     keys::{BodySpec, BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
     mesh_sequence, moving_solid, no_slip, periodic,
     placed_mesh::placed_mesh,
-    probe, sources, start_waves, wave_maker,
+    probe, simulated_depth, sources, start_waves, wave_maker,
 };
 use swell_domain::{bounds::Bounds, sampling};
 use swell_scene::{
@@ -154,6 +154,17 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         spacing: lattice.spacing,
         tolerance: flip.map_or(0.0, |flip| flip.pressure.tolerance),
     };
+    let around = simulated_depth::Surroundings {
+        domain: &domain,
+        gravity: water.gravity,
+        spacing: lattice.spacing,
+        start: &water.waves,
+        incoming: (spec.effects.generation_zone.as_ref()).map(|zone| &zone.waves),
+    };
+    if let Some(floor) = simulated_depth::floor(doc, &around)? {
+        check_count(doc, "water.wave", moving_solids.len() + bodies.len())?;
+        moving_solids.push(floor);
+    }
     moving_solids.extend(bodies);
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {

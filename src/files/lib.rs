@@ -45,6 +45,7 @@ mod reach;
 mod regular_waves;
 mod seas;
 mod settle;
+mod simulated_depth;
 mod solid_track;
 mod sources;
 mod speed;

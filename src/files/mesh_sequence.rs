@@ -68,6 +68,7 @@ pub(super) fn build(
             faults,
         }),
         body: None,
+        floor: None,
     };
     check_way(doc, &built, path, around.domain, around.shot)?;
     Ok(built)

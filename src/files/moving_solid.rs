@@ -100,6 +100,7 @@ pub(super) fn build(
         track,
         sequence: None,
         body: None,
+        floor: None,
     };
     check_way(doc, &solid, path, around.domain, around.shot)?;
     Ok(solid)

@@ -6,7 +6,7 @@ use swell_domain::{
     motion::{Spectrum, wave_number},
     open_waves::Meeting,
 };
-use swell_scene::{SceneError, open_waves::Waves};
+use swell_scene::{SceneError, open_waves::Waves, words::shown};
 
 use super::{
     declare::Keyed,
@@ -102,6 +102,19 @@ pub(super) const fn seed(kinds: Kinds) -> Key {
         .about("another number makes another sea of the same spectrum")
 }
 
+/// Depth of the water that is simulated.
+pub(super) const fn simulated_depth(kinds: Kinds) -> Key {
+    Key::number("simulated_depth", LENGTH)
+        .unit("metres")
+        .absent()
+        .only("kind", kinds)
+        .also(", less than `depth`, and no more than the domain is high")
+        .about(
+            "from still water down to the domain's floor, above which a floor moves as the water \
+             there would; left out, all of `depth` is simulated",
+        )
+}
+
 /// Direction of waves.
 pub(super) const fn direction_degrees() -> Key {
     Key::number("direction_degrees", -360.0..=360.0)
@@ -115,6 +128,8 @@ const SEA: &[&str] = &["sea"];
 const PACKET: &[&str] = &["focused"];
 
 const SPECTRAL: &[&str] = &["sea", "focused"];
+
+const ALL: &[&str] = &["stokes", "sea", "focused"];
 
 /// A test compares them with the fields of each kind.
 impl Keyed for Waves {
@@ -157,8 +172,9 @@ const WAVES_KEYS: &[Key] = &[
         .about("when they meet there"),
     Key::number("depth", LENGTH)
         .unit("metres")
-        .also(", no more than the domain is high")
-        .about("of the water at rest, from the domain's floor"),
+        .also(", no more than the domain is high if all of it is simulated")
+        .about("of the water at rest"),
+    simulated_depth(ALL),
     Key::number_or_zero("ramp", PERIOD)
         .unit("seconds")
         .computed(|| "two periods (of the peak)".to_owned())
@@ -205,5 +221,22 @@ pub(super) fn check(
         let key = format!("{path}.shortest_period");
         seas::check_spacings(doc, &key, shortest)?;
     }
+    check_simulated(doc, path, waves)?;
     check_speed(waves.by(gravity).most_speed()).map_err(|problem| doc.fault_of_plain(path, problem))
+}
+
+/// Rejects a simulated depth that is not less than all.
+fn check_simulated(doc: &Document<'_>, path: &str, waves: &Waves) -> Result<(), SceneError> {
+    let [_, depth, _] = waves.common();
+    match waves.simulated_depth() {
+        Some(simulated) if simulated >= depth => {
+            let problem = format!(
+                "{} m of water that is {} m deep; left out, all of it is simulated",
+                shown(simulated),
+                shown(depth)
+            );
+            Err(doc.fault_of(&format!("{path}.simulated_depth"), problem))
+        }
+        _ => Ok(()),
+    }
 }

@@ -20,6 +20,8 @@ use crate::{
 
 const SEA: &[&str] = &["sea"];
 
+const OPEN: &[&str] = &["stokes", "sea"];
+
 type Result<T> = std::result::Result<T, SceneError>;
 
 /// How far a length of a periodic axis may be from a whole number of wave lengths, in wave lengths.
@@ -57,8 +59,12 @@ impl Keyed for StartWave {
             .about("of the crest from the domain's least corner, along the way that the wave goes"),
         Key::number("depth", LENGTH)
             .unit("metres")
-            .also(", no more than the domain is high, and the same for all waves")
-            .about("of the water at rest, from the domain's floor"),
+            .also(
+                ", no more than the domain is high if all of it is simulated, and the same for all \
+                 waves",
+            )
+            .about("of the water at rest"),
+        open_waves::simulated_depth(OPEN),
         open_waves::direction_degrees(),
     ];
 }
@@ -97,6 +103,14 @@ pub(super) fn check(
             );
             return Err(doc.fault_of(&format!("{path}.depth"), problem));
         }
+        if wave.level() != first.level() {
+            let problem = format!(
+                "{} m are simulated, and {} m of {KEY}[0]",
+                shown(wave.level()),
+                shown(first.level())
+            );
+            return Err(doc.fault_of(&format!("{path}.simulated_depth"), problem));
+        }
         check_one(doc, &path, wave, around)?;
     }
     Ok(())
@@ -115,10 +129,14 @@ fn check_one(
         return Err(doc.fault_of("water.gravity", problem));
     }
     let high = around.domain.size().y;
-    if wave.depth() > high {
-        let (depth, high) = (shown(wave.depth()), shown(high));
+    if wave.level() > high {
+        let (depth, high) = (shown(wave.level()), shown(high));
         let problem = format!("{depth} m of water in a domain that is {high} m high");
-        return refuse("depth", problem);
+        let key = match wave.level() < wave.depth() {
+            true => "simulated_depth",
+            false => "depth",
+        };
+        return refuse(key, problem);
     }
     if let Some(open) = wave.open() {
         open_waves::check(&open, doc, path, -y, around.spacing)?;
@@ -191,7 +209,7 @@ fn check_periods(
 /// Most water below waves, m³: as deep as up to a crest that is one depth high.
 pub(super) fn most_volume(waves: &[StartWave], domain: &Bounds) -> f64 {
     let size = domain.size();
-    let deepest = |wave: &StartWave| (2.0 * wave.depth()).min(size.y);
+    let deepest = |wave: &StartWave| (2.0 * wave.level()).min(size.y);
     waves
         .first()
         .map_or(0.0, |wave| size.x * size.z * deepest(wave))

@@ -9,5 +9,6 @@ mod lint;
 mod lint_solids;
 mod lint_water;
 mod origin;
+mod simulated_depth;
 mod start_waves;
 mod step;

@@ -52,7 +52,7 @@ impl Writer<'_> {
     fn scene(&self) -> SceneSpec {
         let scene = self.scene;
         let still = scene.solids.iter().map(|solid| self.solid(solid));
-        let moving = scene.moving_solids.iter().filter(|it| it.is_prescribed());
+        let moving = scene.drawn_movers().filter(|it| it.is_prescribed());
         SceneSpec {
             shot: scene.shot.clone(),
             domain: self.domain(),

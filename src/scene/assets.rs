@@ -46,7 +46,7 @@ impl Scene {
     /// Returns the mesh files of the scene with their BLAKE3 hashes, each once.
     pub fn mesh_files(&self) -> Vec<(PathBuf, String)> {
         let mut files = Vec::new();
-        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        let moving = self.drawn_movers().map(|solid| &solid.placed);
         let placed = self.solids.iter().chain(moving).chain(&self.water.meshes);
         let placed = placed.chain(self.source_meshes());
         let single = placed.map(|placed| (placed.file.clone(), placed.file_hash.clone()));

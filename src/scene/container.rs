@@ -36,7 +36,7 @@ impl Scene {
             let warning = placed.warning()?;
             Some(format!("{warning}; water fills this container up to there"))
         });
-        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        let moving = self.drawn_movers().map(|solid| &solid.placed);
         let solids = self.solids.iter().chain(moving).filter_map(|placed| {
             let warning = placed.warning()?;
             Some(match self.is_container(placed) {
@@ -50,7 +50,7 @@ impl Scene {
         });
         let open = self.source_meshes().filter_map(PlacedMesh::warning);
         let placed = self.water.meshes.iter().chain(&self.solids);
-        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        let moving = self.drawn_movers().map(|solid| &solid.placed);
         let placed = placed.chain(moving).chain(self.source_meshes());
         let faults = placed.flat_map(|placed| {
             let name = placed.file_name();

@@ -45,6 +45,8 @@ pub struct Made {
     pub period: Option<f64>,
     /// Depth assumed by theory, metres.
     pub depth: Option<f64>,
+    /// Depth of the water that is simulated, metres, if it is not all.
+    pub simulated_depth: Option<f64>,
     /// Time until the waves have their full height, seconds.
     pub ramp: f64,
     /// Time at which the crests of a packet meet, seconds.
@@ -138,7 +140,7 @@ impl Scene {
         let Some(still) = still else {
             return;
         };
-        if let Some(depth) = waves.depth {
+        if let Some(depth) = waves.simulated_depth.or(waves.depth) {
             lints.extend(lint_depth(key, depth, still));
         }
         let room = self.domain.size().y - still.floor;
@@ -156,7 +158,7 @@ impl Scene {
     /// Warns about waves that return from the opposite wall within the shot because
     /// nothing absorbs them.
     fn lint_return(&self, wall: Wall, waves: &Made, level: f64, lints: &mut Vec<String>) {
-        let has_solids = !self.solids.is_empty() || !self.moving_solids.is_empty();
+        let has_solids = !self.solids.is_empty() || self.drawn_movers().next().is_some();
         let zones = self.effects.absorbing();
         let mut walls = zones.iter().flat_map(|(_, absorbs)| absorbs.zone.walls);
         let is_absorbed = walls.any(|other| other.axis == wall.axis);
@@ -289,6 +291,7 @@ fn made_by(index: usize, maker: &WaveMaker, scene: &Scene, still: Option<Still>)
         crest,
         period: Some(period),
         depth: Some(depth),
+        simulated_depth: None,
         ramp,
         meets: None,
     };
@@ -309,6 +312,7 @@ fn made_by(index: usize, maker: &WaveMaker, scene: &Scene, still: Option<Still>)
             crest: *height,
             period: None,
             depth: Some(*depth),
+            simulated_depth: None,
             ramp: 0.0,
             meets: None,
         },

@@ -1,5 +1,5 @@
 //! Moving solids: a mesh that slides along a direction, turns about an axis, follows a track,
-//! changes its shape, or floats.
+//! changes its shape, or floats; and the floor that moves with waves.
 
 use glam::{DQuat, DVec3};
 
@@ -11,6 +11,7 @@ use swell_domain::{
     mesh::TriangleMesh,
     motion::Motion,
     pose::{Passage, Pose},
+    shape::WaveFloor,
 };
 
 /// Largest number of moving solids and bodies in a scene; their poses are a uniform of 64 KiB.
@@ -33,6 +34,8 @@ pub struct MovingSolid {
     pub sequence: Option<MeshSequence>,
     /// What the water moves, in place of all of them.
     pub body: Option<FreeBody>,
+    /// The floor that moves with the waves above it, in place of all of them.
+    pub floor: Option<WaveFloor>,
 }
 
 /// A moving solid that the water moves.
@@ -143,9 +146,19 @@ impl MovingSolid {
         }
     }
 
+    /// Whether its shape changes.
+    pub fn changes_shape(&self) -> bool {
+        self.sequence.is_some() || self.floor.is_some()
+    }
+
     /// Returns whether its motion follows from the scene alone.
     pub fn is_prescribed(&self) -> bool {
         self.body.is_none()
+    }
+
+    /// Whether it is one of the scene file, which pictures and exports show.
+    pub fn is_drawn(&self) -> bool {
+        self.floor.is_none()
     }
 
     /// Whether the solid may rotate.
@@ -221,6 +234,9 @@ impl MovingSolid {
         if let Some(sequence) = &self.sequence {
             return sequence.shape.peak_speed(t0, t1);
         }
+        if let Some(floor) = &self.floor {
+            return floor.peak_speed();
+        }
         let slide = self.slide.as_ref();
         let slide = slide.map_or(0.0, |slide| slide.motion.peak_speed(t0, t1));
         let turn = self.turn.as_ref().map_or(0.0, |turn| {
@@ -271,9 +287,14 @@ impl Scene {
 
     /// Bounds the speed of the surfaces of solids whose shape changes within `[t0, t1]`, m/s.
     pub fn fastest_shape(&self, t0: f64, t1: f64) -> f64 {
-        let sequences = self.sequences();
-        let speeds = sequences.map(|it| it.shape.peak_speed(t0, t1));
+        let shapes = self.moving_solids.iter().filter(|it| it.changes_shape());
+        let speeds = shapes.map(|it| it.peak_speed(&[], t0, t1));
         speeds.fold(0.0, f64::max)
+    }
+
+    /// Iterates over the moving solids that pictures and exports show.
+    pub fn drawn_movers(&self) -> impl Iterator<Item = &MovingSolid> + Clone {
+        self.moving_solids.iter().filter(|it| it.is_drawn())
     }
 
     /// Iterates over the shapes of the solids whose shape changes.

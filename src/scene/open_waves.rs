@@ -34,6 +34,9 @@ pub struct Regular {
     pub period: f64,
     /// Still-water depth, metres.
     pub depth: f64,
+    /// Depth of the water that is simulated, metres; `None` for all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub simulated_depth: Option<f64>,
     /// Time until the full height is reached, seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ramp: Option<f64>,
@@ -62,6 +65,9 @@ macro_rules! of_spectrum {
             pub shortest_period: Option<f64>,
             /// Still-water depth, metres.
             pub depth: f64,
+            /// Depth of the water that is simulated, metres; `None` for all of it.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub simulated_depth: Option<f64>,
             /// Time until the full height is reached, seconds.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub ramp: Option<f64>,
@@ -162,6 +168,20 @@ impl Waves {
         }
     }
 
+    /// Returns the depth of the water that is simulated, metres, if it is not all.
+    pub fn simulated_depth(&self) -> Option<f64> {
+        match self {
+            Self::Stokes(waves) => waves.simulated_depth,
+            Self::Sea(sea) => sea.simulated_depth,
+            Self::Focused(packet) => packet.simulated_depth,
+        }
+    }
+
+    /// Returns the height of still water above the domain's floor, metres.
+    pub fn level(&self) -> f64 {
+        self.simulated_depth().unwrap_or(self.common()[1])
+    }
+
     /// Returns the exponent of the directional spreading; `None` for waves of one direction.
     pub fn spreading(&self) -> Option<f64> {
         match self {
@@ -190,6 +210,7 @@ impl Waves {
             crest,
             period: Some(period),
             depth: Some(depth),
+            simulated_depth: self.simulated_depth(),
             ramp: 0.0,
             meets: match self {
                 Self::Focused(packet) => Some(packet.time),
@@ -201,12 +222,13 @@ impl Waves {
     /// Returns the waves for a gravity, m/s².
     pub fn by(&self, gravity: f64) -> OpenWaves {
         let direction = self.common()[2].to_radians();
-        match self {
+        let waves = match self {
             Self::Stokes(waves) => {
                 OpenWaves::regular(&waves.asked(gravity), DVec2::from_angle(direction))
             }
             Self::Sea(sea) => OpenWaves::sea(&sea.asked(gravity), direction),
             Self::Focused(packet) => OpenWaves::sea(&packet.asked(gravity), direction),
-        }
+        };
+        waves.above(self.level())
     }
 }

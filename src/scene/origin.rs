@@ -59,6 +59,9 @@ impl Scene {
         {
             it.shape = it.shape.moved(way);
         }
+        for it in self.moving_solids.iter_mut().flat_map(|it| &mut it.floor) {
+            *it = it.moved(way);
+        }
         for it in self.moving_solids.iter_mut().flat_map(|it| &mut it.body) {
             it.body.carry(way);
         }

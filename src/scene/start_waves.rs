@@ -9,6 +9,7 @@ use swell_domain::{
     mesh::TriangleMesh,
     open_waves::{OpenSea, OpenWaves},
     parallel,
+    shape::WaveFloor,
     solitary_wave::SolitaryWave,
 };
 
@@ -80,6 +81,16 @@ impl StartWave {
         }
     }
 
+    /// Returns the height of still water above the domain's floor, metres.
+    pub fn level(&self) -> f64 {
+        let simulated = match self {
+            Self::Solitary(_) => None,
+            Self::Stokes(waves) => waves.simulated_depth,
+            Self::Sea(sea) => sea.simulated_depth,
+        };
+        simulated.unwrap_or(self.depth())
+    }
+
     /// Returns the direction of propagation, degrees from +x towards +z.
     pub fn direction_degrees(&self) -> f64 {
         match self {
@@ -115,14 +126,15 @@ impl StartWave {
             Self::Stokes(regular) => {
                 let water = [regular.height, regular.period, regular.depth, gravity];
                 let asked = waves::regular(water, Some(0.0));
-                InitialWave::Open(OpenWaves::regular(&asked, direction))
+                InitialWave::Open(OpenWaves::regular(&asked, direction).above(self.level()))
             }
             Self::Sea(sea) => {
                 let asked = OpenSea {
                     ramp: 0.0,
                     ..sea.asked(gravity)
                 };
-                InitialWave::Open(OpenWaves::sea(&asked, degrees.to_radians()))
+                let waves = OpenWaves::sea(&asked, degrees.to_radians());
+                InitialWave::Open(waves.above(self.level()))
             }
         }
     }
@@ -137,6 +149,7 @@ impl StartWave {
                 crest: wave.height,
                 period: None,
                 depth: Some(wave.depth),
+                simulated_depth: None,
                 ramp: 0.0,
                 meets: None,
             },
@@ -163,6 +176,11 @@ impl Scene {
         let layers = ((highest - room.min.y) / spacing).ceil() + AIR_LAYERS;
         let mut block = room;
         block.max.y = (room.min.y + layers * spacing).min(room.max.y);
+        if let Some(floor) = self.wave_floor() {
+            let [mean, most] = floor.heights();
+            let dry = ((self.domain.min.y + mean - most - room.min.y) / spacing).floor();
+            block.min.y += dry.max(0.0) * spacing;
+        }
         let top = self.domain.max.y.max(highest) + self.solid_margin();
         Some(StartWaves {
             waves,
@@ -173,15 +191,22 @@ impl Scene {
 
     /// Returns the volume of water below the waves of the start, m³; 0 without any.
     pub(crate) fn wave_volume(&self) -> f64 {
-        let spacing = self.particle_spacing();
+        let (room, spacing) = (self.start_domain(), self.particle_spacing());
+        let below_floor = self.wave_floor().map_or(0.0, |floor| floor.volume(&room));
         self.initial_waves().map_or(0.0, |waves| {
-            waves.volume(&self.start_domain(), self.domain.min, spacing)
+            waves.volume(&room, self.domain.min, spacing) - below_floor
         })
     }
 
-    /// Returns the depth of still water below the waves of the start, metres.
+    /// Returns the floor that moves with the waves, where a part of their depth is simulated.
+    pub fn wave_floor(&self) -> Option<&WaveFloor> {
+        self.moving_solids.iter().find_map(|it| it.floor.as_ref())
+    }
+
+    /// Returns the height above the domain's floor of still water below the waves of the start,
+    /// metres.
     pub(crate) fn wave_depth(&self) -> Option<f64> {
-        self.water.waves.first().map(StartWave::depth)
+        self.water.waves.first().map(StartWave::level)
     }
 
     /// Warns about solitary waves that the ends of the domain cut off.

@@ -12,7 +12,7 @@ use swell_domain::{
     mesh::TriangleMesh,
     particles::Particles,
     sampling::{BoundarySample, Fill, boundary_samples, fill_below, fill_water},
-    shape::{ShapeField, ShapeSamples},
+    shape::{ShapeField, ShapeSamples, SurfaceSamples},
     signed_distance::{SignedDistance, SignedDistanceError},
     sources::Sources,
     thin::{Needed, thicken},
@@ -42,7 +42,7 @@ pub struct Volume {
 pub struct ShapeCost {
     /// Name of the solid.
     pub name: String,
-    /// Number of its mesh files.
+    /// Number of its mesh files; 0 for the floor that moves with waves.
     pub files: usize,
     /// Nodes of its grid. On the device each takes 20 bytes.
     pub nodes: usize,
@@ -174,14 +174,15 @@ impl Start {
     pub fn shapes<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = ShapeCost> + 'a {
         let solids = scene.moving_solids.iter().enumerate();
         solids.filter_map(|(index, solid)| {
-            let (shape, sequence) = (self.boundary.shape(index)?, solid.sequence.as_ref()?);
+            let shape = self.boundary.shape(index)?;
             let (times, bytes) = shape.field.cost(0.0, scene.shot.duration());
+            let sequence = solid.sequence.as_ref();
             Some(ShapeCost {
                 name: solid.name(),
-                files: sequence.files.len(),
+                files: sequence.map_or(0, |it| it.files.len()),
                 nodes: shape.field.nodes(),
                 times,
-                bytes: bytes + sequence.shape.bytes(),
+                bytes: bytes + sequence.map_or(0, |it| it.shape.bytes()),
             })
         })
     }
@@ -308,9 +309,9 @@ fn boundary(scene: &Scene, thin: &Thin) -> Result<Boundary, SignedDistanceError>
     let moving = scene
         .moving_solids
         .iter()
-        .map(|solid| match solid.sequence {
-            Some(_) => Vec::new(),
-            None => all_samples(scene, &solid.placed.mesh),
+        .map(|solid| match solid.changes_shape() {
+            true => Vec::new(),
+            false => all_samples(scene, &solid.placed.mesh),
         });
     // FLIP uses only the signed distance of solids.
     let (samples, moving_samples) = match scene.solver.method() {
@@ -348,32 +349,33 @@ fn offsets(scene: &Scene, moving: &[SignedDistance]) -> Vec<f64> {
 /// The moving solids whose shape changes.
 fn shapes(scene: &Scene, thin: &Thin) -> Result<Vec<Option<Shape>>, SignedDistanceError> {
     let spacing = scene.particle_spacing();
+    let margin = scene.solid_margin();
+    let is_sampled = scene.solver.method() == Method::Pbf;
     let shape = |(solid, is_thin): (&MovingSolid, &bool)| {
-        let Some(MeshSequence { shape, .. }) = &solid.sequence else {
-            return Ok(None);
+        let samples: Option<Arc<dyn SurfaceSamples>>;
+        let field = match (&solid.sequence, &solid.floor) {
+            (Some(MeshSequence { shape, .. }), _) => {
+                samples = match is_sampled {
+                    true => Some(Arc::new(ShapeSamples::new(shape, spacing))),
+                    false => None,
+                };
+                ShapeField::new(shape, margin, spacing, is_thin.then_some(thin.needed))?
+            }
+            (None, Some(floor)) => {
+                samples = match is_sampled {
+                    true => Some(Arc::new(floor.samples())),
+                    false => None,
+                };
+                ShapeField::of_floor(floor, margin, spacing)?
+            }
+            (None, None) => return Ok(None),
         };
-        let samples = match scene.solver.method() {
-            Method::Pbf => Some(Arc::new(ShapeSamples::new(shape, spacing))),
-            Method::Flip => None,
-        };
-        Ok(Some(Shape {
-            field: ShapeField::new(
-                shape,
-                scene.solid_margin(),
-                spacing,
-                is_thin.then_some(thin.needed),
-            )?,
-            samples,
-        }))
+        Ok(Some(Shape { field, samples }))
     };
-    match scene.sequences().next() {
-        Some(_) => scene
-            .moving_solids
-            .iter()
-            .zip(&thin.moving)
-            .map(shape)
-            .collect(),
-        None => Ok(Vec::new()),
+    let solids = &scene.moving_solids;
+    match solids.iter().any(MovingSolid::changes_shape) {
+        true => solids.iter().zip(&thin.moving).map(shape).collect(),
+        false => Ok(Vec::new()),
     }
 }
 

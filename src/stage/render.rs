@@ -486,7 +486,7 @@ impl RenderJob<'_> {
         // A renderer knows the paths of what moves about one frame, and the wetness at it.
         let draws_plates = look.spec().wave_makers.is_some() && !self.scene.wave_makers.is_empty();
         let is_wet = look.spec().wet.is_some();
-        let stands = self.scene.moving_solids.is_empty() && !draws_plates && !is_wet;
+        let stands = self.scene.drawn_movers().next().is_none() && !draws_plates && !is_wet;
         self.kept = stands.then_some(renderer);
         Ok(picture)
     }

@@ -116,6 +116,7 @@ mod solve {
     mod flip;
     mod flip_passes;
     mod forces;
+    mod guided_depth;
     mod independent;
     mod ledgers;
     mod moving_frame;

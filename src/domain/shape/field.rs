@@ -1,11 +1,9 @@
 //! Distances to a surface whose shape changes, and its velocities, at the nodes of one grid.
 //!
-//! The grid is around all meshes of the sequence, so that its size never changes. Distances are
+//! The grid is around the surface at all times, so that its size never changes. Distances are
 //! sampled at keys, which are so near each other in time that no point of the surface moves farther
 //! than a node spacing between two, and are linear in between: a solid that is resolved by the grid
-//! does not open as it moves. Between two meshes with different triangles there are no keys.
-//!
-//! A node has the velocity of the point of the surface that is nearest to it.
+//! does not open as it moves.
 
 use std::{
     collections::VecDeque,
@@ -17,14 +15,12 @@ use glam::DVec3;
 use super::{
     super::{
         bounds::Bounds,
-        bvh::{Bvh, nearest_point},
-        mesh::TriangleMesh,
         parallel,
-        signed_distance::{SignedDistance, SignedDistanceError, grid_dims, sampled},
-        thin::{Needed, thicken},
+        signed_distance::{SignedDistance, SignedDistanceError, grid_dims},
+        thin::Needed,
     },
-    Moment, ShapeSequence,
-    samples::{nearest, weights},
+    ShapeSequence, WaveFloor,
+    meshes::MeshKeys,
     with_values,
 };
 
@@ -44,14 +40,25 @@ pub struct ShapeField {
 
 #[derive(Debug)]
 struct Core {
-    sequence: ShapeSequence,
+    keys: Box<dyn Keys>,
     /// The grid, without values.
     grid: SignedDistance,
-    /// Number of parts of each interval between two meshes.
-    parts: Vec<u32>,
-    /// Thickness up to which meshes are thickened.
-    needed: Option<Needed>,
     cache: Mutex<Cache>,
+}
+
+/// The times at which distances to a surface are sampled.
+pub(super) trait Keys: std::fmt::Debug + Send + Sync {
+    /// The part that contains a time, by the key at its beginning, and how much of it has passed.
+    fn place(&self, time: f64) -> (Key, f64);
+
+    /// The key after one.
+    fn after(&self, key: Key) -> Key;
+
+    /// Duration of the part after a key, seconds.
+    fn duration(&self, key: Key) -> f64;
+
+    /// Samples distances at a key, and velocities before it, at the nodes of a grid.
+    fn sampled(&self, grid: &SignedDistance, key: Key) -> Nodes;
 }
 
 #[derive(Debug, Default)]
@@ -60,18 +67,18 @@ struct Cache {
     last: Option<([u64; 2], Arc<ShapeStep>)>,
 }
 
-/// A time at which distances are sampled: this part of the interval after this mesh begins.
+/// A time at which distances are sampled: this part of this interval begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Key {
-    index: usize,
-    part: u32,
+pub(super) struct Key {
+    pub(super) index: usize,
+    pub(super) part: u32,
 }
 
 /// Distances at a key, metres, and velocities over the part before it, m/s.
 #[derive(Debug)]
-struct Nodes {
-    distance: Vec<f32>,
-    velocity: Vec<[f32; 3]>,
+pub(super) struct Nodes {
+    pub(super) distance: Vec<f32>,
+    pub(super) velocity: Vec<[f32; 3]>,
 }
 
 /// A surface in a substep.
@@ -101,23 +108,37 @@ impl ShapeField {
         needed: Option<Needed>,
     ) -> Result<Self, SignedDistanceError> {
         let bounds = sequence.bounds().grown(margin);
+        Self::of(MeshKeys::new(sequence, spacing, needed), &bounds, spacing)
+    }
+
+    /// Prepares the distances to a floor below water, on a grid with nodes `spacing` metres apart
+    /// and `margin` metres around the domain.
+    ///
+    /// # Errors
+    /// If the grid has too many nodes.
+    pub fn of_floor(
+        floor: &WaveFloor,
+        margin: f64,
+        spacing: f64,
+    ) -> Result<Self, SignedDistanceError> {
+        Self::of(floor.clone(), &floor.bounds().grown(margin), spacing)
+    }
+
+    fn of(
+        keys: impl Keys + 'static,
+        bounds: &Bounds,
+        spacing: f64,
+    ) -> Result<Self, SignedDistanceError> {
         let grid = SignedDistance {
             origin: bounds.min,
             spacing,
-            dims: grid_dims(&bounds, spacing)?,
+            dims: grid_dims(bounds, spacing)?,
             values: Vec::new(),
         };
-        let intervals = 0..sequence.meshes().len() - 1;
-        let parts = intervals.map(|index| match sequence.keeps_triangles(index) {
-            true => (sequence.farthest(index) / spacing).ceil().max(1.0) as u32,
-            false => 1,
-        });
         Ok(Self {
             core: Arc::new(Core {
-                sequence: sequence.clone(),
+                keys: Box::new(keys),
                 grid,
-                parts: parts.collect(),
-                needed,
                 cache: Mutex::default(),
             }),
             way: DVec3::ZERO,
@@ -143,11 +164,6 @@ impl ShapeField {
         }
     }
 
-    /// Returns the sequence, in its own coordinates.
-    pub fn sequence(&self) -> &ShapeSequence {
-        &self.core.sequence
-    }
-
     /// Returns the number of nodes.
     pub fn nodes(&self) -> usize {
         self.core.grid.dims.iter().product()
@@ -156,11 +172,11 @@ impl ShapeField {
     /// Returns how often distances are sampled within `[t0, t1]`, seconds, and the bytes that they
     /// take in memory while a bake runs, at most.
     pub fn cost(&self, t0: f64, t1: f64) -> (usize, usize) {
-        let [first, last] = [t0, t1].map(|time| self.core.place(time));
+        let [first, last] = [t0, t1].map(|time| self.core.keys.place(time));
         let mut keys = 1;
         let mut key = first.0;
         while key < last.0 {
-            (key, keys) = (self.core.after(key), keys + 1);
+            (key, keys) = (self.core.keys.after(key), keys + 1);
         }
         let keys = keys + usize::from(last.1 > 0.0);
         let of_key = size_of::<f32>() + size_of::<[f32; 3]>();
@@ -213,38 +229,10 @@ impl ShapeField {
 }
 
 impl Core {
-    /// The part that contains a time, by the key at its beginning, and how much of it has passed.
-    fn place(&self, time: f64) -> (Key, f64) {
-        let Moment { index, part } = self.sequence.moment(time);
-        let parts = self.parts[index];
-        let at = part * f64::from(parts);
-        let part = (at as u32).min(parts - 1);
-        (Key { index, part }, at - f64::from(part))
-    }
-
-    /// The key after one.
-    fn after(&self, Key { index, part }: Key) -> Key {
-        match part + 1 < self.parts[index] {
-            true => Key {
-                index,
-                part: part + 1,
-            },
-            false => Key {
-                index: index + 1,
-                part: 0,
-            },
-        }
-    }
-
-    /// Duration of a part, seconds.
-    fn duration(&self, key: Key) -> f64 {
-        1.0 / (self.sequence.rate() * f64::from(self.parts[key.index]))
-    }
-
     fn values(&self, cache: &mut Cache, time: f64) -> Vec<f32> {
-        let (key, passed) = self.place(time);
+        let (key, passed) = self.keys.place(time);
         let before = (passed < 1.0).then(|| self.nodes(cache, key));
-        let after = (passed > 0.0).then(|| self.nodes(cache, self.after(key)));
+        let after = (passed > 0.0).then(|| self.nodes(cache, self.keys.after(key)));
         match (before, after) {
             (Some(before), Some(after)) => {
                 let [a, b] = [&before.distance, &after.distance];
@@ -263,21 +251,21 @@ impl Core {
         let before = self.values(cache, start);
         let mut velocity = vec![[0.0f32; 3]; before.len()];
         let ([mut key, last], [mut passed, last_passed]) = {
-            let [a, b] = [start, end].map(|time| self.place(time));
+            let [a, b] = [start, end].map(|time| self.keys.place(time));
             ([a.0, b.0], [a.1, b.1])
         };
         while length > 0.0 && key <= last {
             let until = if key == last { last_passed } else { 1.0 };
-            let part = (until - passed) * self.duration(key) / length;
+            let part = (until - passed) * self.keys.duration(key) / length;
             if part > 0.0 {
-                let nodes = self.nodes(cache, self.after(key));
+                let nodes = self.nodes(cache, self.keys.after(key));
                 parallel::for_each_mut(&mut velocity, |n, velocity| {
                     for (sum, v) in velocity.iter_mut().zip(nodes.velocity[n]) {
                         *sum = (f64::from(*sum) + part * f64::from(v)) as f32;
                     }
                 });
             }
-            (key, passed) = (self.after(key), 0.0);
+            (key, passed) = (self.keys.after(key), 0.0);
         }
         let after = self.values(cache, end);
         let speeds = velocity
@@ -296,83 +284,12 @@ impl Core {
         if let Some((_, nodes)) = cache.keys.iter().find(|(of, _)| *of == key) {
             return nodes.clone();
         }
-        let nodes = Arc::new(self.sampled(key));
+        let nodes = Arc::new(self.keys.sampled(&self.grid, key));
         if cache.keys.len() == KEPT {
             cache.keys.pop_front();
         }
         cache.keys.push_back((key, nodes.clone()));
         nodes
-    }
-
-    /// Samples distances at a key, and velocities before it.
-    fn sampled(&self, key: Key) -> Nodes {
-        let (sequence, meshes) = (&self.sequence, self.sequence.meshes());
-        let rate = sequence.rate();
-        let part = match key.part {
-            0 => 0.0,
-            part => f64::from(part) / f64::from(self.parts[key.index]),
-        };
-        let mesh = match key.part {
-            0 => meshes[key.index].clone(),
-            _ => sequence.mesh_at(Moment {
-                index: key.index,
-                part,
-            }),
-        };
-        let earlier = match key.part {
-            0 => key.index.checked_sub(1),
-            _ => Some(key.index),
-        };
-        match earlier {
-            None => self.with_velocities(&mesh, &|_, _, _| DVec3::ZERO),
-            Some(index) if sequence.keeps_triangles(index) => {
-                let [a, b] = [&meshes[index], &meshes[index + 1]];
-                let ways: Vec<DVec3> = (a.vertices.iter().zip(&b.vertices))
-                    .map(|(a, b)| rate * (*b - *a))
-                    .collect();
-                self.with_velocities(&mesh, &|x, triangle, corners| {
-                    let [u, v, w] = weights(x, corners);
-                    let [a, b, c] = mesh.triangles[triangle].map(|k| ways[k as usize]);
-                    u * a + v * b + w * c
-                })
-            }
-            Some(index) => {
-                let tree = Bvh::new(&meshes[index]);
-                let most = rate * sequence.farthest(index);
-                self.with_velocities(&mesh, &|x, _, _| {
-                    let velocity = rate * (x - nearest(&meshes[index], &tree, x));
-                    velocity.clamp_length_max(most)
-                })
-            }
-        }
-    }
-
-    /// Samples the distance to a mesh. `velocity` is that of a point of the mesh, given with the
-    /// index and the corners of its triangle.
-    fn with_velocities(
-        &self,
-        mesh: &TriangleMesh,
-        velocity: &(impl Fn(DVec3, usize, [DVec3; 3]) -> DVec3 + Sync),
-    ) -> Nodes {
-        let grid = &self.grid;
-        let nodes = sampled(
-            mesh,
-            (grid.origin, grid.spacing, grid.dims),
-            &|p, triangle| {
-                let triangle = triangle as usize;
-                let corners = mesh.corners(triangle);
-                let [a, b, c] = corners;
-                let x = nearest_point(p, a, b, c);
-                velocity(x, triangle, corners).as_vec3().to_array()
-            },
-        );
-        let (mut distance, velocity) = nodes.into_iter().unzip();
-        if let Some(needed) = self.needed {
-            let mut field = with_values(grid, distance);
-            thicken(&mut field, &[mesh], &[true], &Bounds::EVERYWHERE, needed);
-            distance = field.values;
-        }
-        Nodes { distance, velocity }
     }
 }
 

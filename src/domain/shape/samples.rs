@@ -29,6 +29,17 @@ pub struct SurfacePoint {
     pub velocity: DVec3,
 }
 
+/// Samples of a surface that moves.
+pub trait SurfaceSamples: std::fmt::Debug + Send + Sync {
+    /// Returns the number of samples at any time.
+    fn count(&self) -> usize;
+
+    /// Returns the samples at `time` with their mean velocity over the `step` seconds before it;
+    /// with a step of 0 they rest. Where the surface has fewer than [`Self::count`], others without
+    /// an area lie far away.
+    fn at(&self, time: f64, step: f64) -> Vec<SurfacePoint>;
+}
+
 /// Samples on all meshes of a sequence, about as far apart as a given spacing. The samples of
 /// meshes with the same triangles are the same points of the surface.
 #[derive(Clone, Debug)]
@@ -72,16 +83,14 @@ impl ShapeSamples {
             runs,
         }
     }
+}
 
-    /// Returns the number of samples at any time.
-    pub fn count(&self) -> usize {
+impl SurfaceSamples for ShapeSamples {
+    fn count(&self) -> usize {
         self.count
     }
 
-    /// Returns the samples at `time` with their mean velocity over the `step` seconds before it;
-    /// with a step of 0 they rest. Where the surface has fewer than [`Self::count`], others without
-    /// an area lie far away.
-    pub fn at(&self, time: f64, step: f64) -> Vec<SurfacePoint> {
+    fn at(&self, time: f64, step: f64) -> Vec<SurfacePoint> {
         let sequence = &self.sequence;
         let mut now = sequence.moment(time);
         if now.part == 0.0 && now.index > 0 {
@@ -117,7 +126,9 @@ impl ShapeSamples {
         found.resize(self.count, away);
         found
     }
+}
 
+impl ShapeSamples {
     /// Points that stay on their triangles.
     fn moved(&self, run: &Run, now: Moment, time: f64, step: f64) -> Vec<SurfacePoint> {
         let sequence = &self.sequence;

@@ -54,12 +54,16 @@ impl Declared for Settings {
         }
         let spacing = 0.5 * around.least_length;
         open_waves::check(&self.waves, doc, WAVES, gravity.length(), spacing)?;
-        let [_, depth, degrees] = self.waves.common();
+        let (depth, [.., degrees]) = (self.waves.level(), self.waves.common());
         let height = around.domain.size().y;
         if depth > height {
             let (depth, height) = (shown(depth), shown(height));
             let problem = format!("{depth} m of water in a domain that is {height} m high");
-            return refuse("waves.depth", problem);
+            let key = match self.waves.simulated_depth() {
+                Some(_) => "waves.simulated_depth",
+                None => "waves.depth",
+            };
+            return refuse(key, problem);
         }
         let direction = DVec2::from_angle(degrees.to_radians());
         let comes_from = |wall: &Wall| {

@@ -95,7 +95,7 @@ impl Scene {
     /// their volume.
     fn placed(&self) -> impl Iterator<Item = (&PlacedMesh, bool)> {
         let moving = self.moving_solids.iter();
-        let moving = moving.map(|solid| (&solid.placed, solid.body.is_none()));
+        let moving = moving.map(|solid| (&solid.placed, solid.body.is_none() && solid.is_drawn()));
         self.solids
             .iter()
             .map(|placed| (placed, true))

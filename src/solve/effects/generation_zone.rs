@@ -25,6 +25,7 @@ fn generation(name: &'static str, settings: &Settings, scene: &Scene) -> Additio
     let count = waves.lines.len();
     let mut constants = constants(settings.zone(), scene);
     constants.push(("WAVE_COUNT", count as f64));
+    constants.push(("WAVE_LEVEL", waves.level()));
     constants.push(("WAVE_DEPTH", waves.depth()));
     Addition {
         passes: vec![pass(name, &constants)],

@@ -132,7 +132,7 @@ impl ExportJob<'_> {
     fn keeps_triangles(&self, index: usize) -> bool {
         let scene = &self.scene;
         let moving = index.checked_sub(scene.solids.len());
-        let sequence = moving.and_then(|k| scene.moving_solids[k].sequence.as_ref());
+        let sequence = moving.and_then(|k| scene.drawn_movers().nth(k)?.sequence.as_ref());
         sequence.is_none_or(|sequence| {
             let triangles = |&frame: &u32| sequence.shape.mesh(scene.shot.time(frame)).triangles;
             let mut all = self.frames.iter().map(triangles);

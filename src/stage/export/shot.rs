@@ -200,7 +200,7 @@ impl ExportJob<'_> {
         let first = scene.solids.len();
         let bodies = self.frames.iter().map(|&frame| self.bodies_at(frame));
         let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
-        let moving = (first..).zip(&scene.moving_solids);
+        let moving = (first..).zip(scene.drawn_movers());
         let moving = moving.map(|(index, solid)| Solid {
             name: solid.name(),
             is_wet: self.wet.is_some(),
@@ -251,7 +251,7 @@ impl ExportJob<'_> {
         };
         let scene = &self.scene;
         let still = scene.solids.iter().map(PlacedMesh::name);
-        let moving = scene.moving_solids.iter().map(MovingSolid::name);
+        let moving = scene.drawn_movers().map(MovingSolid::name);
         let names: Vec<String> = still.chain(moving).collect();
         let mut rest = wetness;
         let surfaces = stream.surfaces().iter();

@@ -36,7 +36,7 @@ pub(crate) fn render_scene(
         after: around[1].map(|it| &it.bodies[..]),
     };
     let time = f64::from(frame) / scene.shot.frames_per_second;
-    let moving = scene.moving_solids.iter();
+    let moving = scene.drawn_movers();
     let moving = moving.map(|solid| solid.mesh(&state.bodies, time));
     let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
     let parts = match look.materials() {
@@ -87,7 +87,7 @@ fn moving_parts(
         return Vec::new();
     }
     let first = scene.solids.len();
-    let solids = scene.moving_solids.iter().enumerate();
+    let solids = scene.drawn_movers().enumerate();
     let solids = solids.map(|(index, solid)| {
         let path = SolidPath::new(solid, bodies);
         SetMotion {
@@ -120,7 +120,7 @@ fn solid_parts(
 ) -> Result<Vec<SolidParts>, MeshError> {
     let of = |placed: &PlacedMesh| (placed.file.clone(), placed.file_hash.clone());
     let still = (scene.solids.iter()).map(|it| (it, of(it), it.name(), Pose::START));
-    let moving = scene.moving_solids.iter().map(|solid| {
+    let moving = scene.drawn_movers().map(|solid| {
         let file = match &solid.sequence {
             Some(sequence) => sequence.file_at(time).clone(),
             None => of(&solid.placed),
@@ -162,6 +162,6 @@ fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
 /// Names of the scene's solids, in the order of [`render_scene`]: those of their mesh files,
 /// without extension.
 pub(super) fn solid_names(scene: &Scene) -> Vec<String> {
-    let moving = scene.moving_solids.iter().map(MovingSolid::name);
+    let moving = scene.drawn_movers().map(MovingSolid::name);
     (scene.solids.iter().map(PlacedMesh::name).chain(moving)).collect()
 }

@@ -96,7 +96,7 @@ impl Balls {
         let water = self.cache.read(frame)?;
         let scene = &self.scene;
         let time = scene.shot.time(frame);
-        let moving = scene.moving_solids.iter();
+        let moving = scene.drawn_movers();
         let moving = moving.map(|solid| solid.mesh(&water.bodies, time));
         let still = scene.solids.iter().map(|solid| solid.mesh.clone());
         let solids: Vec<_> = still.chain(moving).collect();

@@ -29,7 +29,7 @@ pub(super) struct Surface<'a> {
 /// A scene without solids, surfaces with too many vertices, a solid whose triangles change.
 pub(super) fn surfaces(scene: &Scene, edge: f64) -> Result<Vec<Surface<'_>>, WetError> {
     let still = scene.solids.iter().map(|it| (it.name(), &it.mesh, None));
-    let moving = scene.moving_solids.iter();
+    let moving = scene.drawn_movers();
     let moving = moving.map(|it| (it.name(), first_mesh(it), Some(it)));
     let mut left = MOST_VERTICES;
     let mut all = Vec::new();

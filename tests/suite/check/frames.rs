@@ -117,6 +117,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
             track: None,
             sequence: None,
             body: None,
+            floor: None,
             slide: Some(Slide {
                 direction: DVec3::new(0.6, 0.0, 0.8),
                 motion: Motion::ConstantVelocity {

@@ -129,6 +129,7 @@ fn case(method: Method) -> (Scene, Start) {
             peak_period: 0.8,
             shortest_period: None,
             depth: 1.0,
+            simulated_depth: None,
             ramp: Some(0.0),
             direction_degrees: 20.0,
             spreading: Some(10.0),

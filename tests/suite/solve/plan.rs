@@ -95,6 +95,7 @@ fn with_effects(mut scene: Scene) -> Scene {
             peak_period: 1.0,
             shortest_period: None,
             depth: 1.0,
+            simulated_depth: None,
             ramp: None,
             direction_degrees: 20.0,
             spreading: Some(10.0),

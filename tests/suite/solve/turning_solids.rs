@@ -69,6 +69,7 @@ fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
         track: None,
         sequence: None,
         body: None,
+        floor: None,
     }];
     let back = DMat2::from_angle(-angle);
     let all = lattice([0.0; 3], [48, 48, 2 * DEEP], [DX / 2.0; 3]);

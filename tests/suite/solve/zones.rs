@@ -46,6 +46,7 @@ fn waves(walls: &[Wall], length: f64) -> Option<generation_zone::Settings> {
             height: 0.05,
             period: 0.9,
             depth: 0.4,
+            simulated_depth: None,
             ramp: Some(0.1),
             direction_degrees: 180.0,
         }),

@@ -238,6 +238,7 @@ pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
         track: None,
         sequence: None,
         body: None,
+        floor: None,
     }
 }
 

@@ -68,6 +68,7 @@ fn waves_in_shallow_water_are_as_right_as_documented() {
             height: 0.1,
             period: TAU,
             depth: 1.0,
+            simulated_depth: None,
             ramp: None,
             direction_degrees: 0.0,
         }),

@@ -215,6 +215,7 @@ pub fn effects() -> Case {
             peak_period: 0.8,
             shortest_period: None,
             depth: 0.5,
+            simulated_depth: None,
             ramp: Some(0.0),
             direction_degrees: 20.0,
             spreading: Some(10.0),

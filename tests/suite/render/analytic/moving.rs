@@ -304,6 +304,7 @@ fn floating(plate: &Plate) -> MovingSolid {
             reach: 2.0,
             given: GivenMass::default(),
         }),
+        floor: None,
     }
 }
 
