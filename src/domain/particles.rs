@@ -47,6 +47,17 @@ impl Particles {
         self.position.is_empty()
     }
 
+    /// Adds particles at rest with ids from 2³¹ on, whose attributes are 0.
+    pub fn extend_at_rest(&mut self, positions: &[[f32; 3]]) {
+        self.id
+            .extend((0..positions.len() as u32).map(|k| (1 << 31) + k));
+        self.position.extend_from_slice(positions);
+        self.velocity.resize(self.position.len(), [0.0; 3]);
+        for column in self.attributes.values_mut() {
+            column.resize(self.position.len(), 0.0);
+        }
+    }
+
     /// Returns the particles with positions relative to the origin `to` instead of `from`, both in
     /// world coordinates, metres; bodies as well. Positions are rounded to f32.
     #[must_use]

@@ -198,6 +198,7 @@ pub fn render(
         left_out,
         warnings: [request.look.lints(), camera.unwrap_or_default()].concat(),
     });
+    let near = Near::new(&scene);
     let mut job = RenderJob {
         request,
         folder: Arc::new(folder),
@@ -207,7 +208,7 @@ pub fn render(
         scene,
         context,
         numbering,
-        near: Near::default(),
+        near,
         kept: None,
         times: BTreeMap::new(),
     };

@@ -144,6 +144,23 @@ impl WaveFloor {
         step.x * step.y * heights.sum::<f64>()
     }
 
+    /// Returns points of a lattice in the water below the floor that is not simulated, down to the
+    /// domain's.
+    pub fn water_below(&self, time: f64) -> Vec<[f32; 3]> {
+        let size = self.domain.size();
+        let [nx, nz] = [size.x, size.z].map(|edge| (edge / self.spacing).round().max(1.0) as usize);
+        parallel::flat_map(0..nx * nz, |n| {
+            let cell = DVec2::new((n % nx) as f64, (n / nx) as f64) + 0.5;
+            let least = self.domain.min;
+            let at = DVec2::new(least.x, least.z) + cell * self.spacing;
+            let layers = (self.height(at, time).0 - least.y) / self.spacing + 0.5;
+            (0..layers.max(0.0) as usize).map(move |layer| {
+                let y = least.y + (layer as f64 + 0.5) * self.spacing;
+                [at.x as f32, y as f32, at.y as f32]
+            })
+        })
+    }
+
     /// Returns the closed mesh of what is below the floor at a time, seconds, down to `margin`
     /// metres below the domain and as far beyond its sides.
     pub fn mesh(&self, time: f64, margin: f64) -> TriangleMesh {

@@ -150,7 +150,7 @@ impl Framed {
         look: &Look,
         number: u32,
     ) -> Result<Self, RenderJobError> {
-        let around = Near::default().around(cache, look, number)?;
+        let around = Near::new(scene).around(cache, look, number)?;
         let water = &around.water.particles;
         let set = render_scene(scene, look, number, &around.state())?;
         let (seen, _) = truth(look, &set, number, water)?;

@@ -4,13 +4,39 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use super::{pictures::others, set::FrameState};
 use swell_cache::{CacheError, CacheReader};
-use swell_domain::particles::Particles;
+use swell_domain::{particles::Particles, shape::WaveFloor};
 use swell_render::{FrameInputs, REACH, WaterParticles, frames_around};
-use swell_scene::look::Look;
+use swell_scene::{Scene, look::Look};
 
 /// Recently read frames, so that consecutive frames are read only once.
-#[derive(Default)]
-pub(super) struct Near(BTreeMap<u32, Arc<WaterParticles>>);
+pub(super) struct Near {
+    water: DrawnWater,
+    read: BTreeMap<u32, Arc<WaterParticles>>,
+}
+
+/// The water of a cache as pictures show it: with the part of its depth that is not simulated, as
+/// far as the domain reaches.
+pub(super) struct DrawnWater {
+    floor: Option<WaveFloor>,
+    frames_per_second: f64,
+}
+
+impl DrawnWater {
+    pub(super) fn of(scene: &Scene) -> Self {
+        Self {
+            floor: scene.wave_floor().cloned(),
+            frames_per_second: scene.shot.frames_per_second,
+        }
+    }
+
+    /// Adds what lies below the floor in a frame.
+    pub(super) fn complete(&self, frame: u32, mut water: Particles) -> Particles {
+        if let Some(floor) = &self.floor {
+            water.extend_at_rest(&floor.water_below(f64::from(frame) / self.frames_per_second));
+        }
+        water
+    }
+}
 
 /// A frame with those around it.
 pub(super) struct NearbyFrames {
@@ -21,6 +47,13 @@ pub(super) struct NearbyFrames {
 }
 
 impl Near {
+    pub(super) fn new(scene: &Scene) -> Self {
+        Self {
+            water: DrawnWater::of(scene),
+            read: BTreeMap::new(),
+        }
+    }
+
     /// Reads a frame and the frames around it that `look` needs.
     pub(super) fn around(
         &mut self,
@@ -29,7 +62,7 @@ impl Near {
         frame: u32,
     ) -> Result<NearbyFrames, CacheError> {
         let reach = frames_around(look);
-        self.0.retain(|&other, _| other.abs_diff(frame) <= reach);
+        self.read.retain(|&other, _| other.abs_diff(frame) <= reach);
         let water = self.read(cache, frame)?;
         let mut found = [const { None }; 2 * REACH as usize];
         for (side, other) in others(frame) {
@@ -44,11 +77,12 @@ impl Near {
     }
 
     fn read(&mut self, cache: &CacheReader, frame: u32) -> Result<Arc<WaterParticles>, CacheError> {
-        if let Some(water) = self.0.get(&frame) {
+        if let Some(water) = self.read.get(&frame) {
             return Ok(water.clone());
         }
-        let water = Arc::new(WaterParticles::new(cache.read(frame)?));
-        self.0.insert(frame, water.clone());
+        let water = self.water.complete(frame, cache.read(frame)?);
+        let water = Arc::new(WaterParticles::new(water));
+        self.read.insert(frame, water.clone());
         Ok(water)
     }
 }

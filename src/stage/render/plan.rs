@@ -4,7 +4,13 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, Streams, near::Near, render_scene, set::FrameState, told};
+use super::{
+    RenderJobError, Streams,
+    near::{DrawnWater, Near},
+    render_scene,
+    set::FrameState,
+    told,
+};
 use crate::{baked_scene, device::Gpu, prepare::Start};
 use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
@@ -115,6 +121,7 @@ impl Planned {
             }
             Subject::Scene(scene) => {
                 let start = Start::of(scene)?.particles.filled();
+                let start = DrawnWater::of(scene).complete(0, start);
                 let set = render_scene(scene, look, 0, &FrameState::alone(&start))?;
                 let (water, white) = (WaterParticles::new(start), Particles::default());
                 let inputs = FrameInputs::alone(&water, &white);
@@ -124,7 +131,7 @@ impl Planned {
                 let cache = CacheReader::open(directory)?;
                 let frame = fullest(&cache);
                 let scene = baked_scene(&cache, directory)?;
-                let around = Near::default().around(&cache, look, frame)?;
+                let around = Near::new(&scene).around(&cache, look, frame)?;
                 let streams = Streams::open(directory, look, &cache, &[frame])?;
                 let white = streams.white(frame)?;
                 let mut set = render_scene(&scene, look, frame, &around.state())?;

@@ -88,12 +88,13 @@ pub fn preview(
     output::create_folder(&request.directory).map_err(RenderJobError::Output)?;
     let text = page(&cache.manifest().shot, frame);
     output::write(&request.directory.join(PAGE), text).map_err(RenderJobError::Output)?;
+    let near = Near::new(&scene);
     let mut job = Preview {
         frame,
         cache,
         scene,
         context,
-        near: Near::default(),
+        near,
         watched: Watched::new(watched),
         stop,
     };

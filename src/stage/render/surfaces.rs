@@ -24,7 +24,13 @@ use swell_reference::rays::{RayHit, cast, cast_through, moment};
 use swell_render::{RayTimes, RenderError, RenderScene, Renderer, eye, opaque};
 use swell_scene::look::{Look, MethodSpec};
 
-use super::{RenderJobError, near::Near, render_scene, set::FrameState, told};
+use super::{
+    RenderJobError,
+    near::{DrawnWater, Near},
+    render_scene,
+    set::FrameState,
+    told,
+};
 use crate::{baked_scene, device::Gpu};
 use swell_scene::Scene;
 
@@ -177,7 +183,7 @@ pub fn check_render(
             break;
         }
         let whole = Instant::now();
-        let water = cache.read(frame)?;
+        let water = DrawnWater::of(&scene).complete(frame, cache.read(frame)?);
         let set = render_scene(&scene, &request.look, frame, &FrameState::alone(&water))?;
         let begun = Instant::now();
         let (truth, out) = truth(&request.look, &set, frame, &water)?;
@@ -353,7 +359,7 @@ impl Set<'_> {
     /// The picture of a frame with a look as a screen shows it, drawn from the same inputs as in
     /// [`super::render`].
     pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
-        let around = Near::default().around(self.cache, look, frame)?;
+        let around = Near::new(self.scene).around(self.cache, look, frame)?;
         let set = render_scene(self.scene, look, frame, &around.state())?;
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;

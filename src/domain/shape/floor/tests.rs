@@ -135,6 +135,23 @@ fn samples_and_the_mesh_are_those_of_the_floor() {
     assert!((asked / (8.0 * mean) - 1.0).abs() < 0.02, "{asked}");
 }
 
+/// What pictures show below the floor fills the space down to the domain's, up to the floor.
+#[test]
+fn the_water_below_is_what_the_floor_leaves_out() {
+    let floor = floor();
+    let points = floor.water_below(0.4);
+    let [mean, most] = floor.heights();
+    let volume = points.len() as f64 * SPACING.powi(3);
+    // A column's height is rounded to layers, up or down: the mean of many is off by little.
+    assert!((volume / (8.0 * mean) - 1.0).abs() < 0.05, "{volume}");
+    for x in &points {
+        let x = DVec3::from_array(x.map(f64::from));
+        let height = floor.height(DVec2::new(x.x, x.z), 0.4).0;
+        assert!(x.y < height + 1e-6 && x.y > domain().min.y, "{x} {height}");
+        assert!(x.y < domain().min.y + mean + most);
+    }
+}
+
 /// Of waves too short to reach it nothing is left, and the floor rests.
 #[test]
 fn a_floor_below_short_waves_rests() {
