@@ -109,7 +109,11 @@ pub(super) fn check(
                 shown(wave.level()),
                 shown(first.level())
             );
-            return Err(doc.fault_of(&format!("{path}.simulated_depth"), problem));
+            let key = match wave {
+                StartWave::Solitary(_) => "kind",
+                StartWave::Stokes(_) | StartWave::Sea(_) => "simulated_depth",
+            };
+            return Err(doc.fault_of_plain(&format!("{path}.{key}"), problem));
         }
         check_one(doc, &path, wave, around)?;
     }

@@ -92,8 +92,9 @@ impl Scene {
             self.lint_waves(&waves, still, &mut lints);
             made.push((None, waves));
         }
-        if let Some(level) = level {
-            self.lint_zones(level, &made, &mut lints);
+        let whole = |(_, waves): &(_, Made)| waves.simulated_depth.and(waves.depth);
+        if let Some(depth) = made.iter().find_map(whole).or(level) {
+            self.lint_zones(depth, &made, &mut lints);
         }
         for &(k, maker, still) in &makers {
             if let (Some(absorption), Some(still)) = (&maker.absorption, still) {
@@ -107,6 +108,7 @@ impl Scene {
         self.lint_water(&mut lints);
         self.lint_thin(&mut lints);
         self.lint_bodies(&mut lints);
+        self.lint_floor(&mut lints);
         lints.extend(self.effects.lints(self.grain()));
         lints
     }

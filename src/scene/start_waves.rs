@@ -198,6 +198,34 @@ impl Scene {
         })
     }
 
+    /// Warns about bodies that reach the floor below waves, and about waves that walls turn back
+    /// while the floor goes on as if they did not.
+    pub(crate) fn lint_floor(&self, lints: &mut Vec<String>) {
+        let Some(floor) = self.wave_floor() else {
+            return;
+        };
+        let highest = floor.bounds().max.y;
+        for solid in self.moving_solids.iter().filter(|it| it.body.is_some()) {
+            let lowest = solid.placed.mesh.bounds().map(|it| it.min.y);
+            if let Some(lowest) = lowest.filter(|lowest| *lowest < highest) {
+                lints.push(format!(
+                    "body.mesh of {}: it reaches down to {:.3} m, and below {:.3} m no water is \
+                     simulated that would carry it; a greater simulated_depth does",
+                    solid.placed.name(),
+                    lowest + self.origin.y,
+                    highest + self.origin.y
+                ));
+            }
+        }
+        let is_open = self.effects.generation_zone.is_some();
+        if !is_open && !self.periodic[0] && !self.periodic[2] {
+            lints.push(format!(
+                "{KEY}[0].simulated_depth: walls turn the waves back, and their floor moves on as \
+                 if they did not; a generation zone or a periodic axis lets them run"
+            ));
+        }
+    }
+
     /// Returns the floor that moves with the waves, where a part of their depth is simulated.
     pub fn wave_floor(&self) -> Option<&WaveFloor> {
         self.moving_solids.iter().find_map(|it| it.floor.as_ref())

@@ -147,15 +147,14 @@ impl WaveFloor {
     /// Returns points of a lattice in the water below the floor that is not simulated, down to the
     /// domain's.
     pub fn water_below(&self, time: f64) -> Vec<[f32; 3]> {
-        let size = self.domain.size();
-        let [nx, nz] = [size.x, size.z].map(|edge| (edge / self.spacing).round().max(1.0) as usize);
-        parallel::flat_map(0..nx * nz, |n| {
-            let cell = DVec2::new((n % nx) as f64, (n / nx) as f64) + 0.5;
-            let least = self.domain.min;
-            let at = DVec2::new(least.x, least.z) + cell * self.spacing;
-            let layers = (self.height(at, time).0 - least.y) / self.spacing + 0.5;
-            (0..layers.max(0.0) as usize).map(move |layer| {
-                let y = least.y + (layer as f64 + 0.5) * self.spacing;
+        let (columns, bottom) = (self.samples(), self.domain.min.y);
+        parallel::flat_map(0..columns.count(), |n| {
+            let at = columns.place(n);
+            let height = self.height(at, time).0;
+            // Layers follow the floor, so that none appears at its surface.
+            let layers = ((height - bottom) / self.spacing + 0.5).max(0.0);
+            (0..layers as usize).map(move |layer| {
+                let y = height - (layer as f64 + 0.5) * self.spacing;
                 [at.x as f32, y as f32, at.y as f32]
             })
         })
@@ -248,18 +247,30 @@ pub struct FloorSamples {
     counts: [usize; 2],
 }
 
+impl FloorSamples {
+    /// Lengths that a sample stands for along x and z, metres.
+    fn edge(&self) -> DVec2 {
+        let (size, [nx, nz]) = (self.floor.domain.size(), self.counts);
+        DVec2::new(size.x / nx as f64, size.z / nz as f64)
+    }
+
+    /// x and z of a sample, metres.
+    fn place(&self, n: usize) -> DVec2 {
+        let (least, [nx, _]) = (self.floor.domain.min, self.counts);
+        let cell = DVec2::new((n % nx) as f64, (n / nx) as f64) + 0.5;
+        DVec2::new(least.x, least.z) + cell * self.edge()
+    }
+}
+
 impl SurfaceSamples for FloorSamples {
     fn count(&self) -> usize {
         self.counts[0] * self.counts[1]
     }
 
     fn at(&self, time: f64, step: f64) -> Vec<SurfacePoint> {
-        let (floor, [nx, nz]) = (&self.floor, self.counts);
-        let (least, size) = (floor.domain.min, floor.domain.size());
-        let edge = DVec2::new(size.x / nx as f64, size.z / nz as f64);
+        let (floor, edge) = (&self.floor, self.edge());
         parallel::map(0..self.count(), |n| {
-            let cell = DVec2::new((n % nx) as f64, (n / nx) as f64) + 0.5;
-            let at = DVec2::new(least.x, least.z) + cell * edge;
+            let at = self.place(n);
             let (height, slope) = floor.height(at, time);
             let rise = match step {
                 0.0 => 0.0,

@@ -118,6 +118,28 @@ fn a_floor_that_does_not_fit_its_waves_is_refused_by_key() {
     );
 }
 
+/// Walls turn waves back, and a body needs water under it.
+#[test]
+fn what_the_floor_does_not_fit_is_said() {
+    let lints = |zone: Option<String>, more: &str| {
+        let cut = format!("{STOKES}, simulated_depth = 1.2");
+        load(&at_start(&cut), zone, more)
+            .expect("loads")
+            .lints()
+            .join("; ")
+    };
+    let cut = format!("{STOKES}, simulated_depth = 1.2, ramp = 0.0");
+    let said = lints(None, "");
+    assert!(
+        said.contains("water.wave[0].simulated_depth: walls turn the waves back"),
+        "{said}"
+    );
+    assert_eq!(lints(Some(cut.clone()), ""), "");
+    // On 5 m of water waves of 1.41851 s are 3.14 m long, and on 1.2 m 3.1 m.
+    let short = lints(Some(cut.replace("period = 1.41851", "period = 2.9")), "");
+    assert!(short.contains("on 5 m of water"), "{short}");
+}
+
 /// The crests of a packet are not there at the start, so that its floor needs no waves there.
 #[test]
 fn a_packet_brings_its_floor() {
