@@ -97,7 +97,7 @@ pub struct ShapeStep {
 impl ShapeField {
     /// Prepares the distances to `sequence` on a grid with nodes `spacing` metres apart and
     /// `margin` metres around all meshes. Where a mesh is thinner than `needed`, if that is given,
-    /// it is [thickened](thicken).
+    /// it is [thickened](crate::thin::thicken).
     ///
     /// # Errors
     /// If the grid has too many nodes.
