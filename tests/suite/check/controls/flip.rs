@@ -218,8 +218,8 @@ pub const FLIP: &[Control] = &[
     ),
     own(
         "effects/generate_faces",
-        "exp(wave.w * (y - WAVE_DEPTH))",
-        "exp(wave.w * 1.05 * (y - WAVE_DEPTH))",
+        "exp(wave.w * below)",
+        "exp(wave.w * 1.05 * below)",
         &["velocity at faces"],
     ),
     own(
