@@ -262,6 +262,30 @@ band = 5
     let scene = parse(dir.path(), pool, &[]).expect("valid");
     let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
+    let ocean = r#"
+[shot]
+name = "ocean"
+frames = 1
+frames_per_second = 30
+[domain]
+min = [0, 0, 0]
+max = [8, 4, 4]
+[[water.wave]]
+kind = "stokes"
+height = 0.3
+period = 1.8
+depth = 9.0
+simulated_depth = 3.0
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.25
+[effects]
+generation_zone = { walls = ["-x"], length = 4.0, waves = { kind = "stokes", height = 0.3, period = 1.8, depth = 9.0, simulated_depth = 3.0, ramp = 0.0 } }
+"#;
+    let scene = parse(dir.path(), ocean, &[]).expect("valid");
+    let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
+    collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points read from it; `walls` is written as the list
     // of no-slip walls.
     let read = [
