@@ -96,6 +96,26 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     )?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     periodic::check_makers(doc, periodic, &wave_makers)?;
+    let around = effects::Surroundings {
+        domain: &domain,
+        periodic,
+        wave_makers: &wave_makers,
+        gravity: water.gravity,
+        least_length: 2.0 * lattice.spacing,
+        has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
+    };
+    effects::check(&spec.effects, doc, &around)?;
+    let around = simulated_depth::Surroundings {
+        domain: &domain,
+        gravity: water.gravity,
+        spacing: lattice.spacing,
+        start: &water.waves,
+        incoming: (spec.effects.generation_zone.as_ref()).map(|zone| &zone.waves),
+    };
+    if let Some(floor) = simulated_depth::floor(doc, &around)? {
+        check_count(doc, "water.wave", moving_solids.len() + bodies.len())?;
+        moving_solids.push(floor);
+    }
     let around = sources::Around {
         domain: &domain,
         shot: &shot,
@@ -112,15 +132,6 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     mesh_sequence::check_emitters(doc, &moving_solids, &emitters, lattice.spacing)?;
     let entering = swell_scene::sources::most_entering(&emitters, lattice.spacing, &shot);
     check_particle_count(doc, &water, entering, &domain, &lattice)?;
-    let around = effects::Surroundings {
-        domain: &domain,
-        periodic,
-        wave_makers: &wave_makers,
-        gravity: water.gravity,
-        least_length: 2.0 * lattice.spacing,
-        has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
-    };
-    effects::check(&spec.effects, doc, &around)?;
     let grids = match &spec.grids {
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
@@ -154,17 +165,6 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         spacing: lattice.spacing,
         tolerance: flip.map_or(0.0, |flip| flip.pressure.tolerance),
     };
-    let around = simulated_depth::Surroundings {
-        domain: &domain,
-        gravity: water.gravity,
-        spacing: lattice.spacing,
-        start: &water.waves,
-        incoming: (spec.effects.generation_zone.as_ref()).map(|zone| &zone.waves),
-    };
-    if let Some(floor) = simulated_depth::floor(doc, &around)? {
-        check_count(doc, "water.wave", moving_solids.len() + bodies.len())?;
-        moving_solids.push(floor);
-    }
     moving_solids.extend(bodies);
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {

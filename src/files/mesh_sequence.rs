@@ -218,8 +218,9 @@ pub(super) fn check_emitters(
     for (index, emitter) in emitters.iter().enumerate() {
         let room = emitter.shape.bounds().grown(spacing);
         for solid in solids {
-            let around = solid.sequence.as_ref().map(|it| it.shape.bounds());
-            let both = around.map(|around| around.intersection(&room));
+            let both = solid
+                .changing_bounds()
+                .map(|around| around.intersection(&room));
             if both.is_some_and(|both| both.min.cmplt(both.max).all()) {
                 let problem = format!(
                     "the emitter's volume meets the box around {}, whose shape changes; move one \

@@ -94,7 +94,7 @@ pub(super) fn floor(
     }
     Ok(Some(MovingSolid {
         placed: PlacedMesh {
-            file: PathBuf::from("floor"),
+            file: PathBuf::from("the floor"),
             file_hash: String::new(),
             placement: Placement::default(),
             mesh: floor.mesh(0.0, around.spacing),

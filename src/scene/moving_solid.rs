@@ -8,6 +8,7 @@ use swell_domain::{
     absorber::AbsorberStates,
     body::{Body, BodyState},
     boundary::Boundary,
+    bounds::Bounds,
     mesh::TriangleMesh,
     motion::Motion,
     pose::{Passage, Pose},
@@ -149,6 +150,12 @@ impl MovingSolid {
     /// Whether its shape changes.
     pub fn changes_shape(&self) -> bool {
         self.sequence.is_some() || self.floor.is_some()
+    }
+
+    /// Returns the smallest box around it at all times, if its shape changes.
+    pub fn changing_bounds(&self) -> Option<Bounds> {
+        let sequence = self.sequence.as_ref().map(|it| it.shape.bounds());
+        sequence.or_else(|| self.floor.as_ref().map(WaveFloor::bounds))
     }
 
     /// Returns whether its motion follows from the scene alone.

@@ -14,11 +14,18 @@ use swell_domain::{
 };
 
 use crate::{
-    Scene,
+    Scene, Wall,
     lint::Made,
     open_waves::{Regular, Sea, Waves},
+    probe::{Bearer, ProbeKind},
     waves,
     words::shown,
+};
+
+/// The domain's floor.
+const FLOOR: Wall = Wall {
+    axis: 1,
+    is_max: false,
 };
 
 /// Key of the waves.
@@ -198,8 +205,8 @@ impl Scene {
         })
     }
 
-    /// Warns about bodies that reach the floor below waves, and about waves that walls turn back
-    /// while the floor goes on as if they did not.
+    /// Warns about bodies and probes that reach the floor below waves, and about waves that walls
+    /// reflect while the floor moves as if they did not.
     pub(crate) fn lint_floor(&self, lints: &mut Vec<String>) {
         let Some(floor) = self.wave_floor() else {
             return;
@@ -217,11 +224,25 @@ impl Scene {
                 ));
             }
         }
+        let is_below = |kind: &ProbeKind| match kind {
+            ProbeKind::Pressure { at } => at.y < highest,
+            ProbeKind::Force { on, .. } => *on == Bearer::Wall(FLOOR),
+            _ => false,
+        };
+        for (index, probe) in self.probes.iter().enumerate() {
+            if is_below(&probe.kind) {
+                lints.push(format!(
+                    "probe[{index}]: it measures nothing below {:.3} m, where no water is \
+                     simulated (simulated_depth)",
+                    highest + self.origin.y
+                ));
+            }
+        }
         let is_open = self.effects.generation_zone.is_some();
         if !is_open && !self.periodic[0] && !self.periodic[2] {
             lints.push(format!(
-                "{KEY}[0].simulated_depth: walls turn the waves back, and their floor moves on as \
-                 if they did not; a generation zone or a periodic axis lets them run"
+                "{KEY}[0].simulated_depth: walls reflect the waves, and the floor moves as if they \
+                 did not; add a generation zone or a periodic axis"
             ));
         }
     }

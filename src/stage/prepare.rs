@@ -274,12 +274,14 @@ impl Thin {
     fn of(scene: &Scene) -> Self {
         let parts = scene.thin_solids();
         let (at_rest, moving) = parts.split_at(scene.solids.len());
-        let moving = moving.iter().zip(&scene.moving_solids);
+        let mut moving = moving.iter();
+        let is_thin = |solid: &MovingSolid| {
+            let part = solid.is_drawn().then(|| moving.next()).flatten();
+            part.is_some_and(Option::is_some) && solid.body.is_none()
+        };
         Self {
             at_rest: at_rest.iter().map(Option::is_some).collect(),
-            moving: moving
-                .map(|(part, solid)| part.is_some() && solid.body.is_none())
-                .collect(),
+            moving: scene.moving_solids.iter().map(is_thin).collect(),
             needed: scene.needed_thickness(),
         }
     }

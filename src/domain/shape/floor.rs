@@ -1,11 +1,11 @@
 //! A floor that moves as the water of waves does at its height.
 //!
-//! Deep below the surface water moves little and is not worth simulating, but a floor at rest there
-//! would hold it: two over the wave number below the surface it makes waves of a given length 1.8 %
-//! slower. A floor that moves with the water changes nothing above it, because no water crosses it.
+//! Little moves deep below the surface, but a floor at rest there makes waves of a given length
+//! slower, by 1.8 % at a depth of two over the wave number (c² = g/k tanh kd). A floor that moves
+//! with the water does not change the flow above it, because no water crosses it.
 //!
-//! The surface through water of mean height y is y + ∫ v dt to first order in the steepness; what
-//! is left out of it is smaller than the floor's motion by the steepness.
+//! The material surface of mean height y is at y + ∫ v dt, with v of linear theory at y (Dean and
+//! Dalrymple 1991, §4); the error is the floor's motion times the steepness.
 
 use std::f64::consts::TAU;
 
@@ -149,7 +149,7 @@ impl WaveFloor {
     pub fn water_below(&self, time: f64) -> Vec<[f32; 3]> {
         let (columns, bottom) = (self.samples(), self.domain.min.y);
         parallel::flat_map(0..columns.count(), |n| {
-            let at = columns.place(n);
+            let at = columns.position(n);
             let height = self.height(at, time).0;
             // Layers follow the floor, so that none appears at its surface.
             let layers = ((height - bottom) / self.spacing + 0.5).max(0.0);
@@ -255,7 +255,7 @@ impl FloorSamples {
     }
 
     /// x and z of a sample, metres.
-    fn place(&self, n: usize) -> DVec2 {
+    fn position(&self, n: usize) -> DVec2 {
         let (least, [nx, _]) = (self.floor.domain.min, self.counts);
         let cell = DVec2::new((n % nx) as f64, (n / nx) as f64) + 0.5;
         DVec2::new(least.x, least.z) + cell * self.edge()
@@ -270,7 +270,7 @@ impl SurfaceSamples for FloorSamples {
     fn at(&self, time: f64, step: f64) -> Vec<SurfacePoint> {
         let (floor, edge) = (&self.floor, self.edge());
         parallel::map(0..self.count(), |n| {
-            let at = self.place(n);
+            let at = self.position(n);
             let (height, slope) = floor.height(at, time);
             let rise = match step {
                 0.0 => 0.0,

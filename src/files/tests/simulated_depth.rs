@@ -118,7 +118,7 @@ fn a_floor_that_does_not_fit_its_waves_is_refused_by_key() {
     );
 }
 
-/// Walls turn waves back, and a body needs water under it.
+/// Walls reflect waves, and a body or a probe needs water around it.
 #[test]
 fn what_the_floor_does_not_fit_is_said() {
     let lints = |zone: Option<String>, more: &str| {
@@ -131,10 +131,39 @@ fn what_the_floor_does_not_fit_is_said() {
     let cut = format!("{STOKES}, simulated_depth = 1.2, ramp = 0.0");
     let said = lints(None, "");
     assert!(
-        said.contains("water.wave[0].simulated_depth: walls turn the waves back"),
+        said.contains("water.wave[0].simulated_depth: walls reflect the waves"),
         "{said}"
     );
     assert_eq!(lints(Some(cut.clone()), ""), "");
+    // The floor of the water lies between 0.2 and 0.22 m above the domain's, at y = 5.
+    let probe = |probe: &str| lints(Some(cut.clone()), &format!("[[probe]]\n{probe}"));
+    let pressure = |y: f64| probe(&format!("kind = \"pressure\"\nat = [6.0, {y}, 0.15]"));
+    assert!(
+        pressure(5.15).contains("probe[0]: it measures nothing below 5.2"),
+        "{}",
+        pressure(5.15)
+    );
+    assert_eq!(pressure(5.5), "");
+    let force = probe("kind = \"force\"\nsolid = \"-y\"");
+    assert!(
+        force.contains("probe[0]: it measures nothing below 5.2"),
+        "{force}"
+    );
+    // What is emitted below the floor, or where it moves, would never be water.
+    let emitter = |y: f64| {
+        let text = format!(
+            "[[emitter]]\nmin = [6.0, {y}, 0.0]\nmax = [7.0, {}, 0.3]\nvelocity = [1.0, 0.0, 0.0]",
+            y + 0.3
+        );
+        let cut = format!("{STOKES}, simulated_depth = 1.2");
+        load(&at_start(&cut), None, &text).map_err(|error| error.to_string())
+    };
+    let said = emitter(5.05).expect_err("refused");
+    assert!(
+        said.contains("meets the box around the floor, whose shape changes"),
+        "{said}"
+    );
+    assert!(emitter(5.6).is_ok(), "{:?}", emitter(5.6).err());
     // On 5 m of water waves of 1.41851 s are 3.14 m long, and on 1.2 m 3.1 m.
     let short = lints(Some(cut.replace("period = 1.41851", "period = 2.9")), "");
     assert!(short.contains("on 5 m of water"), "{short}");

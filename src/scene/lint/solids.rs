@@ -70,7 +70,8 @@ impl Scene {
     }
 
     /// Returns the thinnest part of each solid, first those at rest, then those that move, that is
-    /// thinner than [needed](Self::needed_thickness), with water or air on both sides.
+    /// thinner than [needed](Self::needed_thickness), with water or air on both sides. The floor that
+    /// moves with waves is not among them.
     pub fn thin_solids(&self) -> Vec<Option<ThinPart>> {
         let (spacing, needed) = (self.particle_spacing(), self.needed_thickness());
         let room = self.walled();
@@ -94,8 +95,8 @@ impl Scene {
     /// All solids, and whether they are thickened where they are thin: bodies displace the water of
     /// their volume.
     fn placed(&self) -> impl Iterator<Item = (&PlacedMesh, bool)> {
-        let moving = self.moving_solids.iter();
-        let moving = moving.map(|solid| (&solid.placed, solid.body.is_none() && solid.is_drawn()));
+        let moving = self.drawn_movers();
+        let moving = moving.map(|solid| (&solid.placed, solid.body.is_none()));
         self.solids
             .iter()
             .map(|placed| (placed, true))
