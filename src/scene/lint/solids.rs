@@ -70,8 +70,8 @@ impl Scene {
     }
 
     /// Returns the thinnest part of each solid, first those at rest, then those that move, that is
-    /// thinner than [needed](Self::needed_thickness), with water or air on both sides. The floor that
-    /// moves with waves is not among them.
+    /// thinner than [needed](Self::needed_thickness), with water or air on both sides. The floor
+    /// that moves with waves is not among them.
     pub fn thin_solids(&self) -> Vec<Option<ThinPart>> {
         let (spacing, needed) = (self.particle_spacing(), self.needed_thickness());
         let room = self.walled();
