@@ -110,7 +110,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         gravity: water.gravity,
         spacing: lattice.spacing,
         start: &water.waves,
-        incoming: (spec.effects.generation_zone.as_ref()).map(|zone| &zone.waves),
+        incoming: spec.effects.generated(),
     };
     if let Some(floor) = simulated_depth::floor(doc, &around)? {
         check_count(doc, "water.wave", moving_solids.len() + bodies.len())?;

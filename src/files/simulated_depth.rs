@@ -10,7 +10,6 @@ use swell_domain::{
 };
 use swell_scene::{
     PlacedMesh, Placement, SceneError,
-    effects::generation_zone::WAVES,
     moving_solid::MovingSolid,
     open_waves::Waves,
     start_waves::{KEY, StartWave},
@@ -29,8 +28,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) spacing: f64,
     /// Waves at the start.
     pub(super) start: &'a [StartWave],
-    /// Waves of a generation zone.
-    pub(super) incoming: Option<&'a Waves>,
+    /// Waves of a generation zone, with their key.
+    pub(super) incoming: Option<(&'a str, &'a Waves)>,
 }
 
 /// Lays the floor; `None` where all of the water is simulated.
@@ -43,19 +42,19 @@ pub(super) fn floor(
     let depths = |wave: &StartWave| [wave.depth(), wave.level()];
     let (path, waves): (String, Vec<OpenWaves>) = match (around.start, around.incoming) {
         ([], None) => return Ok(None),
-        ([], Some(incoming)) if incoming.simulated_depth().is_none() => return Ok(None),
-        ([], Some(incoming @ Waves::Focused(_))) => (key(WAVES), vec![incoming.by(gravity)]),
-        ([], Some(_)) => {
+        ([], Some((_, waves))) if waves.simulated_depth().is_none() => return Ok(None),
+        ([], Some((zone, waves @ Waves::Focused(_)))) => (key(zone), vec![waves.by(gravity)]),
+        ([], Some((zone, _))) => {
             let problem = format!(
                 "the floor moves with waves that are on the water from the start: the same waves \
                  in [[{KEY}]] put them there"
             );
-            return Err(doc.fault_of(&key(WAVES), problem));
+            return Err(doc.fault_of(&key(zone), problem));
         }
         ([first, ..], incoming) => {
             let [depth, level] = depths(first);
             let is_cut = level < depth;
-            if let Some(incoming) = incoming
+            if let Some((zone, incoming)) = incoming
                 && (is_cut || incoming.simulated_depth().is_some())
                 && [incoming.common()[1], incoming.level()] != [depth, level]
             {
@@ -66,7 +65,7 @@ pub(super) fn floor(
                     shown(level),
                     shown(depth)
                 );
-                return Err(doc.fault_of(&key(WAVES), problem));
+                return Err(doc.fault_of(&key(zone), problem));
             }
             if !is_cut {
                 return Ok(None);

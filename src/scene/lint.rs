@@ -80,7 +80,7 @@ impl Scene {
             }
             made.push((Some(maker.wall), waves));
         }
-        for waves in self.effects.made() {
+        if let Some(waves) = self.effects.made() {
             self.lint_waves(&waves, still, &mut lints);
             self.lint_packet(&waves, &mut lints);
             made.push((None, waves));

@@ -238,7 +238,7 @@ impl Scene {
                 ));
             }
         }
-        let is_open = self.effects.generation_zone.is_some();
+        let is_open = self.effects.generated().is_some();
         if !is_open && !self.periodic[0] && !self.periodic[2] {
             lints.push(format!(
                 "{KEY}[0].simulated_depth: walls reflect the waves, and the floor moves as if they \
@@ -304,7 +304,7 @@ impl Scene {
             self.effects
                 .waves(gravity)
                 .filter(|_| !self.water.waves.is_empty()),
-            self.effects.made().into_iter().next(),
+            self.effects.made(),
         ) else {
             return;
         };

@@ -8,7 +8,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{Absorbs, Effect, zone::Zone};
-use crate::{Wall, lint::Made, open_waves::Waves};
+use crate::{Wall, open_waves::Waves};
 use swell_domain::open_waves::OpenWaves;
 
 /// Key of the waves.
@@ -65,12 +65,8 @@ impl Effect for Settings {
         })
     }
 
-    fn makes(&self) -> Option<Made> {
-        Some(self.waves.made(WAVES.to_owned()))
-    }
-
-    fn waves(&self, gravity: DVec3) -> Option<OpenWaves> {
-        Some(self.incoming(gravity))
+    fn generates(&self) -> Option<(&'static str, &Waves)> {
+        Some((WAVES, &self.waves))
     }
 }
 

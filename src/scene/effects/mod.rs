@@ -9,7 +9,7 @@ pub mod zone;
 
 use glam::DVec3;
 
-use super::lint::Made;
+use super::{lint::Made, open_waves::Waves};
 use swell_domain::open_waves::OpenWaves;
 use zone::Zone;
 
@@ -64,13 +64,8 @@ pub(super) trait Effect {
         None
     }
 
-    /// Waves that the effect generates.
-    fn makes(&self) -> Option<Made> {
-        None
-    }
-
-    /// Theory of the generated waves for a gravity, m/s².
-    fn waves(&self, _gravity: DVec3) -> Option<OpenWaves> {
+    /// Waves that the effect generates, with their key.
+    fn generates(&self) -> Option<(&'static str, &Waves)> {
         None
     }
 }
@@ -148,7 +143,7 @@ macro_rules! effects {
             pub fn beside_zones(&self) -> Option<&'static str> {
                 let zones: [(bool, &'static str); Self::NAMES.len()] = [$((
                     self.$name.as_ref().is_some_and(|it| {
-                        Effect::absorbs(it).is_none() && Effect::makes(it).is_none()
+                        Effect::absorbs(it).is_none() && Effect::generates(it).is_none()
                     }),
                     stringify!($name),
                 )),+];
@@ -233,17 +228,20 @@ macro_rules! effects {
                 zones
             }
 
-            /// Returns the waves that the enabled effects generate.
-            pub(super) fn made(&self) -> Vec<Made> {
-                let mut made = Vec::new();
-                $(made.extend(self.$name.as_ref().and_then(Effect::makes));)+
-                made
+            /// Returns the waves of the first enabled effect that generates any, with their key.
+            pub fn generated(&self) -> Option<(&'static str, &Waves)> {
+                None$(.or_else(|| self.$name.as_ref()?.generates()))+
             }
 
-            /// Returns the theory of the waves of the first enabled effect that generates any, for
-            /// a gravity, m/s².
+            /// Returns what lints have to know of the generated waves.
+            pub(super) fn made(&self) -> Option<Made> {
+                let (key, waves) = self.generated()?;
+                Some(waves.made(key.to_owned()))
+            }
+
+            /// Returns the theory of the generated waves for a gravity, m/s².
             pub fn waves(&self, gravity: DVec3) -> Option<OpenWaves> {
-                None$(.or_else(|| self.$name.as_ref()?.waves(gravity)))+
+                Some(self.generated()?.1.by(gravity.length()))
             }
         }
     };
