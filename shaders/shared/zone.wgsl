@@ -6,6 +6,13 @@ override ZONE_INVERSE_LENGTH: f32;
 override ZONE_SIZE_X: f32;
 override ZONE_SIZE_Y: f32;
 override ZONE_SIZE_Z: f32;
+// Velocity of the undisturbed water, m/s.
+override CURRENT_X: f32;
+override CURRENT_Z: f32;
+
+fn current() -> vec3f {
+    return vec3f(CURRENT_X, 0.0, CURRENT_Z);
+}
 
 // Fraction by which a step moves the velocity of water at x towards the target velocity; x in
 // metres from the domain's minimum corner. It is r Δt / (1 + r Δt), where r grows with the square

@@ -61,6 +61,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let no_slip = no_slip::build(doc, &spec.domain, (solver.method(), between), periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     periodic::check_gravity(doc, periodic, water.gravity)?;
+    periodic::check_current(doc, periodic, water.current)?;
     let around = start_waves::Surroundings {
         domain: &domain,
         periodic,
@@ -101,6 +102,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         periodic,
         wave_makers: &wave_makers,
         gravity: water.gravity,
+        current: water.current,
         least_length: 2.0 * lattice.spacing,
         has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
     };
@@ -108,6 +110,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let around = simulated_depth::Surroundings {
         domain: &domain,
         gravity: water.gravity,
+        current: water.current,
         spacing: lattice.spacing,
         start: &water.waves,
         incoming: spec.effects.generated(),
@@ -288,6 +291,7 @@ fn water(
     let mut water = Water {
         rest_density: spec.rest_density,
         gravity: DVec3::from_array(spec.gravity),
+        current: DVec3::from_array(spec.current.unwrap_or_default()),
         blocks: Vec::new(),
         meshes: Vec::new(),
         waves: spec.wave.clone(),

@@ -118,6 +118,26 @@ pub(super) fn check_gravity(
     Err(doc.fault_of_plain(KEY, problem))
 }
 
+/// Rejects a current along an axis that has walls.
+pub(super) fn check_current(
+    doc: &Document<'_>,
+    periodic: [bool; 3],
+    current: DVec3,
+) -> Result<(), SceneError> {
+    let Some(axis) = (0..3).find(|&axis| current[axis] != 0.0 && !(periodic[axis] && axis != 1))
+    else {
+        return Ok(());
+    };
+    let problem = match axis {
+        1 => "it has to be level, and along y it is not 0".to_owned(),
+        _ => {
+            let name = Axis::NAMED[axis].0;
+            format!("walls bound the domain along {name}: {KEY} has to name {name}")
+        }
+    };
+    Err(doc.fault_of("water.current", problem))
+}
+
 /// Rejects wave makers on periodic axes, which have no walls.
 pub(super) fn check_makers(
     doc: &Document<'_>,

@@ -25,6 +25,8 @@ const MOST: f64 = 0.5;
 pub(super) struct Surroundings<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) gravity: DVec3,
+    /// Velocity of the undisturbed water, m/s.
+    pub(super) current: DVec3,
     pub(super) spacing: f64,
     /// Waves at the start.
     pub(super) start: &'a [StartWave],
@@ -80,6 +82,10 @@ pub(super) fn floor(
             (key(&format!("{KEY}[0]")), open.collect())
         }
     };
+    if around.current != DVec3::ZERO {
+        let problem = format!("the floor of {path} moves with waves on water that does not flow");
+        return Err(doc.fault_of("water.current", problem));
+    }
     let floor = WaveFloor::new(&waves, around.domain, around.spacing);
     let ([mean, most], level) = (floor.heights(), waves[0].level());
     if mean + most > MOST * level {

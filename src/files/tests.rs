@@ -4,6 +4,7 @@ mod absorption;
 mod band;
 mod body;
 mod budget;
+mod current;
 mod generation_zone;
 mod lint;
 mod lint_solids;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use toml::Table;
 
 use super::{
@@ -15,6 +16,7 @@ use super::{
     },
     toml_text::{table, to_toml},
 };
+
 use swell_domain::{
     absorption::Absorption,
     bounds::Bounds,
@@ -100,6 +102,7 @@ impl Writer<'_> {
         WaterSpec {
             rest_density: water.rest_density,
             gravity: water.gravity.to_array(),
+            current: (water.current != DVec3::ZERO).then(|| water.current.to_array()),
             block: water.blocks.iter().map(|it| self.block(it)).collect(),
             mesh: water.meshes.iter().map(|it| self.mesh(it)).collect(),
             wave: water.waves.clone(),

@@ -172,9 +172,12 @@ pub struct Water {
     pub rest_density: f64,
     /// Gravitational acceleration, m/s².
     pub gravity: DVec3,
-    /// Boxes filled with water at rest, metres.
+    /// Velocity of the undisturbed water, m/s, along periodic axes: that of the start, to which
+    /// waves add theirs, and towards which zones lead.
+    pub current: DVec3,
+    /// Boxes filled with water, metres.
     pub blocks: Vec<Bounds>,
-    /// Closed meshes filled with water at rest.
+    /// Closed meshes filled with water.
     pub meshes: Vec<PlacedMesh>,
     /// Waves at the start. The water below them fills the domain, and there are no blocks and
     /// meshes beside it.

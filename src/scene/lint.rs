@@ -85,6 +85,7 @@ impl Scene {
             self.lint_packet(&waves, &mut lints);
             made.push((None, waves));
         }
+        self.lint_current(&mut lints);
         self.lint_cut_waves(&mut lints);
         self.lint_sum(&mut lints);
         self.lint_incoming(&mut lints);
@@ -213,6 +214,24 @@ impl Scene {
                 shown(meets),
                 shown(duration)
             ));
+        }
+    }
+
+    /// Warns about solids in a current whose disturbance comes back through the period.
+    fn lint_current(&self, lints: &mut Vec<String>) {
+        let movers = self.drawn_movers().next();
+        if self.solids.is_empty() && movers.is_none() && self.bodies().next().is_none() {
+            return;
+        }
+        let zones = self.effects.absorbing();
+        for (axis, name) in [(0, "x"), (2, "z")] {
+            let mut walls = zones.iter().flat_map(|(_, absorbs)| absorbs.zone.walls);
+            if self.water.current[axis] != 0.0 && !walls.any(|wall| wall.axis == axis) {
+                lints.push(format!(
+                    "water.current: what solids do to it leaves at one end of the domain along \
+                     {name} and comes in at the other; an absorbing zone there ends it"
+                ));
+            }
         }
     }
 

@@ -311,8 +311,8 @@ impl Scene {
             .filter_map(|it| it.sequence.as_ref())
     }
 
-    /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, and of
-    /// moving solids within `[t0, t1]`, m/s.
+    /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, of moving
+    /// solids and of the current that zones lead to within `[t0, t1]`, m/s.
     pub fn peak_boundary_speed(
         &self,
         absorbers: &AbsorberStates,
@@ -324,7 +324,7 @@ impl Scene {
         let makers = makers.map(|(maker, absorber)| maker.peak_speed(absorber, t0, t1));
         let solids = self.moving_solids.iter().filter(|it| it.is_prescribed());
         let solids = solids.map(|solid| solid.peak_speed(bodies, t0, t1));
-        let fastest = self.fastest_body(bodies);
+        let fastest = self.fastest_body(bodies).max(self.water.current.length());
         makers.chain(solids).fold(fastest, f64::max)
     }
 }

@@ -351,14 +351,17 @@ impl Scene {
         waves.map(|(index, wave)| wave.made(index))
     }
 
-    /// Sets the velocities that particles have in the waves of the start.
-    pub fn move_with_waves(&self, position: &[[f32; 3]], velocity: &mut [[f32; 3]]) {
-        let Some(waves) = self.initial_waves() else {
+    /// Sets the velocities that particles have at the start: those of the current and the waves.
+    pub fn move_at_start(&self, position: &[[f32; 3]], velocity: &mut [[f32; 3]]) {
+        let current = self.water.current;
+        let waves = self.initial_waves();
+        if waves.is_none() && current == DVec3::ZERO {
             return;
-        };
+        }
         parallel::for_each_mut(velocity, |k, velocity| {
             let place = DVec3::from_array(position[k].map(f64::from)) - self.domain.min;
-            *velocity = waves.velocity(place).as_vec3().to_array();
+            let of_waves = waves.as_ref().map_or(DVec3::ZERO, |it| it.velocity(place));
+            *velocity = (current + of_waves).as_vec3().to_array();
         });
     }
 }

@@ -104,7 +104,7 @@ impl Start {
         };
         let (mut particles, mut removed) = (fill.particles, fill.removed);
         particles.bodies = scene.bodies_at_start();
-        scene.move_with_waves(&particles.position, &mut particles.velocity);
+        scene.move_at_start(&particles.position, &mut particles.velocity);
         for swarm in &scene.water.particles {
             for at in &swarm.at {
                 if room != scene.domain && !room.contains(*at) {

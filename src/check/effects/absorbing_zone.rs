@@ -1,7 +1,5 @@
 //! Absorbing zones, on particles and on faces.
 
-use glam::DVec3;
-
 use crate::{
     comparison::{Comparison, Io, PassResult, comparison, names},
     flip::FlipState,
@@ -15,12 +13,13 @@ use super::zone::{self, PART};
 
 entries! {
     "effects/absorb_particles" {
-        VELOCITY = "velocity", "m/s": [part: "" PART, v: "|v| before"]
-            (part + 4.0 * U) * v, "a product";
+        VELOCITY = "velocity", "m/s": [part: "" PART, v: "|v| before and the current's"]
+            (part + 6.0 * U) * v, "two products, and a sum";
     }
     "effects/absorb_faces" {
-        FACES = "velocity at faces", "m/s": [part: "" PART, old: "|v| before gravity", v: "|v|"]
-            (part + 6.0 * U) * old + 2.0 * U * v, "a product, and a difference";
+        FACES = "velocity at faces", "m/s": [part: "" PART,
+            old: "|v| before gravity and the current's", v: "|v|"]
+            (part + 7.0 * U) * old + 2.0 * U * v, "a product, and two differences";
     }
 }
 
@@ -42,8 +41,9 @@ fn particles(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     };
     let size = state.scene.domain.size();
     let part = zone::part(settings.zone(), size, state.substep.time_step);
-    let none = |_| DVec3::ZERO;
-    zone::particles(state, io, settings.zone(), &VELOCITY, none, |v| [part, v])
+    let current = state.scene.water.current;
+    let wanted = |_| current;
+    zone::particles(state, io, settings.zone(), &VELOCITY, wanted, |v| [part, v])
 }
 
 fn faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
@@ -52,7 +52,8 @@ fn faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     };
     let size = state.scene.domain.size();
     let part = zone::part(settings.zone(), size, state.step().length);
-    let none = |_| DVec3::ZERO;
+    let current = state.scene.water.current;
+    let wanted = |_| current;
     let magnitudes = |[old, v]: [f64; 2]| [part, old, v];
-    zone::faces(state, io, settings.zone(), &FACES, none, magnitudes)
+    zone::faces(state, io, settings.zone(), &FACES, wanted, magnitudes)
 }

@@ -29,12 +29,13 @@ bounds! {
 entries! {
     "effects/generate_particles" {
         VELOCITY = "velocity", "m/s": [part: "" PART, most: "r Δt / (1 + r Δt) at the wall",
-            wave: "" WAVE, speed: "Σ|u| of the waves", v: "|v| before"]
+            wave: "" WAVE, speed: "Σ|u| of the waves", v: "|v| before and the current's"]
             part * (v + speed) + most * wave + 6.0 * U * (v + most * speed), "a product, and a sum";
     }
     "effects/generate_faces" {
         FACES = "velocity at faces", "m/s": [part: "" PART, most: "r Δt / (1 + r Δt) at the wall",
-            wave: "" WAVE, speed: "Σ|u| of the waves", old: "|v| before gravity", v: "|v|"]
+            wave: "" WAVE, speed: "Σ|u| of the waves",
+            old: "|v| before gravity and the current's", v: "|v|"]
             part * (old + speed) + most * wave + 6.0 * U * (most * (old + speed) + v),
             "a product, and a sum";
     }
@@ -74,7 +75,8 @@ fn particles(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let (step, time) = (state.substep.time_step, state.substep.time);
     let part = zone::part(zone, size, step);
     let [most, wave, speed] = sizes(&waves, zone.rate, size, step);
-    let wanted = |place| waves.velocity(place, time);
+    let current = state.scene.water.current;
+    let wanted = |place| current + waves.velocity(place, time);
     let magnitudes = |v| [part, most, wave, speed, v];
     zone::particles(state, io, zone, &VELOCITY, wanted, magnitudes)
 }
@@ -91,7 +93,8 @@ fn faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (step, time) = (state.step().length, state.step().start);
     let part = zone::part(zone, size, step);
     let [most, wave, speed] = sizes(&waves, zone.rate, size, step);
-    let wanted = |place| waves.velocity(place, time);
+    let current = state.scene.water.current;
+    let wanted = |place| current + waves.velocity(place, time);
     let magnitudes = |[old, v]: [f64; 2]| [part, most, wave, speed, old, v];
     zone::faces(state, io, zone, &FACES, wanted, magnitudes)
 }

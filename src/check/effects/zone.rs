@@ -51,8 +51,10 @@ pub(super) fn particles<const N: usize>(
     let step = (state.scene.domain.size(), state.substep.time_step);
     let reference = led_particles(zone, step, (&places, &is_drop), &velocity, wanted);
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
+    let current = state.scene.water.current.length();
     io.table.each(entry, 0..n, |i| {
-        pair(i, found[i], reference[i], magnitudes(velocity[i].length()))
+        let before = velocity[i].length() + current;
+        pair(i, found[i], reference[i], magnitudes(before))
     });
     Ok(())
 }
@@ -81,8 +83,9 @@ pub(super) fn faces<const N: usize>(
         old: &old,
     };
     let reference = led_faces(zone, water, &before, wanted);
+    let current = state.scene.water.current.length();
     io.table.each(entry, elements.active(), |e| {
-        let sizes = [old[e].length(), before[e].length()];
+        let sizes = [old[e].length() + current, before[e].length()];
         pair(e, found[e], reference[e], magnitudes(sizes))
     });
     Ok(())

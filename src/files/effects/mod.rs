@@ -16,6 +16,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) wave_makers: &'a [WaveMaker],
     /// Gravitational acceleration, m/s².
     pub(super) gravity: DVec3,
+    /// Velocity of the undisturbed water, m/s.
+    pub(super) current: DVec3,
     /// Least length of a zone, metres: two particle spacings.
     pub(super) least_length: f64,
     /// Whether the solver projects velocities on a grid.

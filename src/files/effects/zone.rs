@@ -5,6 +5,9 @@ use swell_scene::{SceneError, effects::zone::Zone, words::shown};
 use super::Surroundings;
 use crate::document::Document;
 
+/// Largest part of a disturbance that a current may carry through a zone.
+const MOST_LEFT: f64 = 0.05;
+
 /// Rejects a zone whose walls or length do not fit the scene; `effect` is its key.
 pub(super) fn check(
     zone: &Zone<'_>,
@@ -30,8 +33,9 @@ pub(super) fn check(
         if zone.walls[..index].contains(wall) {
             return refuse(format!("{name:?} is listed twice"));
         }
-        if around.periodic[wall.axis] {
-            let problem = "domain.periodic joins both ends";
+        let through = around.current[wall.axis].abs();
+        if around.periodic[wall.axis] && through == 0.0 {
+            let problem = "domain.periodic joins both ends, and no current runs through them";
             return refuse(format!("there is no wall {name}: {problem}"));
         }
         if around.wave_makers.iter().any(|maker| maker.wall == *wall) {
@@ -43,6 +47,18 @@ pub(super) fn check(
                 "the domain reaches {} m from the wall {name}, but the zone is {} m long",
                 shown(room),
                 shown(zone.length)
+            );
+            return length(problem);
+        }
+        let left = zone.left(through);
+        if left > MOST_LEFT {
+            let problem = format!(
+                "a current of {} m/s leaves a zone of {} m with {:.0} % of what disturbs it, and \
+                 {:.0} % are allowed: make it longer, or the period of its waves shorter",
+                shown(through),
+                shown(zone.length),
+                100.0 * left,
+                100.0 * MOST_LEFT
             );
             return length(problem);
         }

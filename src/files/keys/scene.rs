@@ -161,6 +161,14 @@ keys! { struct WaterSpec {
         .unit("m/s²")
         .default("[0.0, -9.81, 0.0]")
         .about("acceleration of all water"),
+    current: Option<[f64; 3]> = vector(3, VECTOR)
+        .unit("m/s")
+        .absent()
+        .also(", of which y is 0, and x and z are where domain.periodic does not name them")
+        .about(
+            "velocity of the undisturbed water: blocks, meshes and waves have it at the start, and \
+             zones lead towards it; the water of a ship's frame of reference",
+        ),
     #[serde(default)]
     block: Vec<BoxSpec> = tables().about("A box full of water"),
     #[serde(default)]

@@ -68,6 +68,8 @@ pub struct Model {
     boundary: Option<Boundary>,
     /// Gravity of the scene, m/s², whichever part of the solver applies it.
     pub scene_gravity: DVec3,
+    /// Velocity of the undisturbed water, m/s.
+    pub current: DVec3,
 }
 
 /// A moving solid.
@@ -162,6 +164,7 @@ impl Model {
             gravity: scene.predicted_gravity(),
             cells: Cells::periodic(size, support, scene.period()),
             scene_gravity: scene.water.gravity,
+            current: scene.water.current,
         };
         model.take_samples(scene, boundary, &[], (0.0, 0.0));
         model.stand(scene, &[], 0.0, 0.0);

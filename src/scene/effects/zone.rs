@@ -37,6 +37,12 @@ impl Zone<'_> {
         led / (1.0 + led)
     }
 
+    /// Returns the part of a disturbance that is left where a current of `speed`, m/s, leaves a
+    /// zone: exp(−∫ r dx / U), where r is the rate times the squared depth in the zone.
+    pub fn left(&self, speed: f64) -> f64 {
+        (-self.rate * self.length / (3.0 * speed)).exp()
+    }
+
     /// Returns the mask of the zone's walls, made of [`Wall::bit`].
     pub fn bits(&self) -> u32 {
         self.walls.iter().map(Wall::bit).sum()

@@ -12,5 +12,7 @@ pub(super) fn constants(zone: Zone<'_>, scene: &Scene) -> Vec<(&'static str, f64
         ("ZONE_SIZE_X", size.x),
         ("ZONE_SIZE_Y", size.y),
         ("ZONE_SIZE_Z", size.z),
+        ("CURRENT_X", scene.water.current.x),
+        ("CURRENT_Z", scene.water.current.z),
     ]
 }

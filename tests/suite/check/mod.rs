@@ -112,6 +112,8 @@ fn case(method: Method) -> (Scene, Start) {
         drop_radius: 1e-3,
         wind: [5.0, 1.0, -2.0],
     });
+    // Zones lead towards it.
+    scene.water.current = DVec3::new(0.3, 0.0, -0.2);
     // From both ends, and longer than the water.
     scene.effects.absorbing_zone = Some(absorbing_zone::Settings {
         walls: vec![Wall::NAMED[0].1, Wall::NAMED[5].1],

@@ -120,6 +120,57 @@ fn a_flow_dies_out_as_the_zone_says() {
     }
 }
 
+/// In a box without walls an absorbing zone drives water at rest as a current does: what is left of
+/// the difference in each layer is Π 1 / (1 + r(y) Δt), as where a flow dies out. Water that has
+/// the current's velocity keeps it to rounding, and with another current it would not.
+#[test]
+fn a_zone_leads_water_to_the_current() {
+    let context = context();
+    for method in METHODS {
+        let (mut scene, mut particles) = half_full(method);
+        scene.periodic = [true, false, true];
+        scene.water.gravity = DVec3::ZERO;
+        of_flip::flip(&mut scene).pic_blend = 0.0;
+        scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 8.0);
+        let current = DVec3::new(0.5, 0.0, -0.3);
+        scene.water.current = current;
+        let (frames, step) = (25, 0.02f64);
+        let rate = 5.0 * std::f64::consts::PI / 8.0;
+        let left = |y: f64| (1.0 + rate * step * (1.0 - y / 0.4).powi(2)).powi(-frames);
+        let apart = |state: &Particles, axis: usize| -> f64 {
+            let found = layers(state, axis).into_iter().enumerate();
+            let gaps = found.map(|(layer, found)| {
+                let y = 0.1 * layer as f64;
+                let mean = 0.5 * (left(y + 0.025) + left(y + 0.075));
+                (found - current[axis] * (1.0 - mean)).abs()
+            });
+            gaps.fold(0.0, f64::max)
+        };
+        for state in [
+            on_gpu(&context, &scene, &particles, frames as u32),
+            on_cpu(&scene, &particles, frames as u32),
+        ] {
+            for axis in [0, 2] {
+                let found = apart(&state, axis);
+                println!("{method:?}, axis {axis}: {found:.1e} m/s off");
+                assert!(found < 0.01, "{found}");
+            }
+        }
+        particles.velocity.fill(current.as_vec3().to_array());
+        let off = |scene: &Scene| -> f64 {
+            let state = on_gpu(&context, scene, &particles, frames as u32);
+            let velocity = state.velocity.iter();
+            let off = velocity.map(|v| DVec3::from_array(v.map(f64::from)) - current);
+            off.map(DVec3::length).fold(0.0, f64::max)
+        };
+        let kept = off(&scene);
+        scene.water.current = 1.1 * current;
+        let moved = off(&scene);
+        println!("{method:?}: {kept:.1e} m/s kept, {moved:.1e} with another current");
+        assert!(kept < 1e-5 && moved > 0.01, "{kept} {moved}");
+    }
+}
+
 /// A zone damps existing motion. If it also damped what gravity adds in a step, more near the wall
 /// than elsewhere, the water would begin to circulate.
 #[test]

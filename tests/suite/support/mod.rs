@@ -54,6 +54,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
         water: Water {
             rest_density: 1000.0,
             gravity: DVec3::new(0.0, -9.81, 0.0),
+            current: DVec3::ZERO,
             blocks: Vec::new(),
             meshes: Vec::new(),
             waves: Vec::new(),

@@ -253,11 +253,14 @@ frames_per_second = 30
 [domain]
 min = [0, 0, 0]
 max = [4, 4, 4]
+periodic = ["x"]
 [solver]
 method = "flip"
 [solver.flip]
 cell_size = 0.25
 band = 5
+[water]
+current = [1.0, 0.0, 0.0]
 "#;
     let scene = parse(dir.path(), pool, &[]).expect("valid");
     let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());

@@ -1,4 +1,5 @@
-//! Absorbing zones: damp the velocity that particles transferred to faces.
+//! Absorbing zones: move the velocity that particles transferred to faces towards that of the
+//! undisturbed water.
 
 use glam::DVec3;
 
@@ -9,7 +10,8 @@ use swell_scene::effects::absorbing_zone::Settings;
 impl Acts for Settings {
     fn on_faces(&self, water: FaceInputs<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
         *velocity = timings.time("effects/absorb_faces", || {
-            led_faces(self.zone(), water, velocity, |_| DVec3::ZERO)
+            let current = water.model.scene.water.current;
+            led_faces(self.zone(), water, velocity, |_| current)
         });
     }
 }

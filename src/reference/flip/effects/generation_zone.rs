@@ -1,5 +1,5 @@
 //! Generation zones: move face velocities from those that particles transferred towards those of
-//! the waves.
+//! the waves and the current.
 
 use glam::DVec3;
 
@@ -10,10 +10,11 @@ use swell_scene::effects::generation_zone::Settings;
 impl Acts for Settings {
     fn on_faces(&self, water: FaceInputs<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
         *velocity = timings.time("effects/generate_faces", || {
-            let waves = self.incoming(water.model.scene.water.gravity);
+            let still = &water.model.scene.water;
+            let waves = self.incoming(still.gravity);
             let time = water.step.start;
             led_faces(self.zone(), water, velocity, |place| {
-                waves.velocity(place, time)
+                still.current + waves.velocity(place, time)
             })
         });
     }

@@ -1,4 +1,4 @@
-//! Absorbing zones: damp the velocities of particles.
+//! Absorbing zones: move velocities of particles towards that of the undisturbed water.
 
 use glam::DVec3;
 
@@ -15,6 +15,7 @@ pub(super) fn apply(
     timings.time("effects/absorb_particles", || {
         let step = (inputs.model.size, inputs.substep.time_step);
         let water = (inputs.points, inputs.is_drop);
-        led_particles(settings.zone(), step, water, velocity, |_| DVec3::ZERO)
+        let current = inputs.model.current;
+        led_particles(settings.zone(), step, water, velocity, |_| current)
     })
 }

@@ -1,4 +1,5 @@
-//! Generation zones: move velocities of particles towards those of the waves.
+//! Generation zones: move velocities of particles towards those of the waves and the
+//! current.
 
 use glam::DVec3;
 
@@ -17,7 +18,7 @@ pub(super) fn apply(
         let step = (inputs.model.size, inputs.substep.time_step);
         let water = (inputs.points, inputs.is_drop);
         led_particles(settings.zone(), step, water, velocity, |place| {
-            waves.velocity(place, inputs.substep.time)
+            inputs.model.current + waves.velocity(place, inputs.substep.time)
         })
     })
 }

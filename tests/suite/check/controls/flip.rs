@@ -206,8 +206,20 @@ pub const FLIP: &[Control] = &[
     ),
     own(
         "effects/absorb_faces",
-        "part * face_change[face]",
-        "1.001 * part * face_change[face]",
+        "part * excess",
+        "1.001 * part * excess",
+        &["velocity at faces"],
+    ),
+    own(
+        "effects/absorb_faces",
+        "- current()",
+        "- 1.001 * current()",
+        &["velocity at faces"],
+    ),
+    own(
+        "effects/generate_faces",
+        "+ current()",
+        "+ 1.1 * current()",
         &["velocity at faces"],
     ),
     own(

@@ -62,9 +62,23 @@ pub const PBF: &[Control] = &[
     .and(&UNSORTED),
     control(
         "effects/absorb_particles",
-        "let kept = 1.0 -",
-        "let kept = 1.0001 -",
+        "(1.0 - part) *",
+        "(1.0001 - part) *",
         "effects/absorb_particles",
+        &["velocity"],
+    ),
+    control(
+        "effects/absorb_particles",
+        "part * current()",
+        "1.001 * part * current()",
+        "effects/absorb_particles",
+        &["velocity"],
+    ),
+    control(
+        "effects/generate_particles",
+        "+ current()",
+        "+ 2.0 * current()",
+        "effects/generate_particles",
         &["velocity"],
     ),
     control(
