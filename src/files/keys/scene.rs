@@ -164,7 +164,7 @@ keys! { struct WaterSpec {
     current: Option<[f64; 3]> = vector(3, VECTOR)
         .unit("m/s")
         .absent()
-        .also(", of which y is 0, and x and z are where domain.periodic does not name them")
+        .also(", y 0, and x and z only where domain.periodic names them")
         .about(
             "velocity of the undisturbed water: blocks, meshes and waves have it at the start, and \
              zones lead towards it; the water of a ship's frame of reference",
