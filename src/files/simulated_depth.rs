@@ -83,7 +83,7 @@ pub(super) fn floor(
         }
     };
     if around.current != DVec3::ZERO {
-        let problem = format!("the floor of {path} moves with waves on water that does not flow");
+        let problem = format!("{path} does not support a current");
         return Err(doc.fault_of("water.current", problem));
     }
     let floor = WaveFloor::new(&waves, around.domain, around.spacing);

@@ -217,7 +217,7 @@ impl Scene {
         }
     }
 
-    /// Warns about solids in a current whose disturbance comes back through the period.
+    /// Warns about wakes of solids that re-enter the domain through a periodic axis.
     fn lint_current(&self, lints: &mut Vec<String>) {
         let movers = self.drawn_movers().next();
         if self.solids.is_empty() && movers.is_none() && self.bodies().next().is_none() {
@@ -228,8 +228,8 @@ impl Scene {
             let mut walls = zones.iter().flat_map(|(_, absorbs)| absorbs.zone.walls);
             if self.water.current[axis] != 0.0 && !walls.any(|wall| wall.axis == axis) {
                 lints.push(format!(
-                    "water.current: what solids do to it leaves at one end of the domain along \
-                     {name} and comes in at the other; an absorbing zone there ends it"
+                    "water.current: the wakes of solids re-enter the domain along {name}; add an \
+                     absorbing zone at one of its ends"
                 ));
             }
         }

@@ -324,7 +324,11 @@ impl Scene {
         let makers = makers.map(|(maker, absorber)| maker.peak_speed(absorber, t0, t1));
         let solids = self.moving_solids.iter().filter(|it| it.is_prescribed());
         let solids = solids.map(|solid| solid.peak_speed(bodies, t0, t1));
-        let fastest = self.fastest_body(bodies).max(self.water.current.length());
+        let of_zones = match self.effects.absorbing()[..] {
+            [] => 0.0,
+            _ => self.water.current.length(),
+        };
+        let fastest = self.fastest_body(bodies).max(of_zones);
         makers.chain(solids).fold(fastest, f64::max)
     }
 }

@@ -5,7 +5,8 @@ use swell_scene::{SceneError, effects::zone::Zone, words::shown};
 use super::Surroundings;
 use crate::document::Document;
 
-/// Largest part of a disturbance that a current may carry through a zone.
+/// Largest part of a disturbance that a current may carry through a zone: what a zone of one and a
+/// half wave lengths may reflect of a wave's height.
 const MOST_LEFT: f64 = 0.05;
 
 /// Rejects a zone whose walls or length do not fit the scene; `effect` is its key.
@@ -53,11 +54,11 @@ pub(super) fn check(
         let left = zone.left(through);
         if left > MOST_LEFT {
             let problem = format!(
-                "a current of {} m/s leaves a zone of {} m with {:.0} % of what disturbs it, and \
-                 {:.0} % are allowed: make it longer, or the period of its waves shorter",
+                "a current of {} m/s carries {:.0} % of a disturbance through a zone of {} m, and at \
+                 most {:.0} % may pass; make the zone longer or the period shorter",
                 shown(through),
-                shown(zone.length),
                 100.0 * left,
+                shown(zone.length),
                 100.0 * MOST_LEFT
             );
             return length(problem);

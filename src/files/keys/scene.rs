@@ -166,8 +166,8 @@ keys! { struct WaterSpec {
         .absent()
         .also(", y 0, and x and z only where domain.periodic names them")
         .about(
-            "velocity of the undisturbed water: blocks, meshes and waves have it at the start, and \
-             zones lead towards it; the water of a ship's frame of reference",
+            "velocity of the undisturbed water: blocks, meshes and waves start with it, and zones \
+             relax the water towards it, as seen from a ship under way",
         ),
     #[serde(default)]
     block: Vec<BoxSpec> = tables().about("A box full of water"),

@@ -75,6 +75,28 @@ fn layers(state: &Particles, axis: usize) -> [f64; 4] {
     sums.map(|(sum, count)| sum / count)
 }
 
+/// Frames of [`left_of_layers`], each one step.
+const FRAMES: u32 = 25;
+
+/// A periodic box without gravity and without FLIP's numerical diffusion, whose zone lies on the
+/// floor.
+fn zone_on_the_floor(method: Method) -> (Scene, Particles) {
+    let (mut scene, particles) = half_full(method);
+    scene.periodic = [true, false, true];
+    scene.water.gravity = DVec3::ZERO;
+    of_flip::flip(&mut scene).pic_blend = 0.0;
+    scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 8.0);
+    (scene, particles)
+}
+
+/// Part of a velocity's distance from the target that the zone leaves in each layer of cells, which
+/// has two layers of particles: Π 1 / (1 + r(y) Δt).
+fn left_of_layers() -> [f64; 4] {
+    let (rate, step) = (5.0 * std::f64::consts::PI / 8.0, 0.02);
+    let left = |y: f64| (1.0f64 + rate * step * (1.0 - y / 0.4).powi(2)).powi(-(FRAMES as i32));
+    [0.0, 0.1, 0.2, 0.3].map(|y| 0.5 * (left(y + 0.025) + left(y + 0.075)))
+}
+
 /// In a flow along x in a periodic box only the zone takes velocity: a layer of particles at y
 /// keeps the fraction Π 1 / (1 + r(y) Δt). With FLIP a layer of cells is the mean over two of them,
 /// and α is 0, because α would carry a layer's velocity to the next at α Δx² / (6 Δt); a particle
@@ -84,23 +106,12 @@ fn layers(state: &Particles, axis: usize) -> [f64; 4] {
 fn a_flow_dies_out_as_the_zone_says() {
     let context = context();
     for method in METHODS {
-        let (mut scene, mut particles) = half_full(method);
-        scene.periodic = [true, false, true];
-        scene.water.gravity = DVec3::ZERO;
-        of_flip::flip(&mut scene).pic_blend = 0.0;
+        let (mut scene, mut particles) = zone_on_the_floor(method);
         particles.velocity.fill([0.5, 0.0, 0.0]);
-        scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 8.0);
-        let (frames, step) = (25, 0.02f64);
-        let rate = 5.0 * std::f64::consts::PI / 8.0;
-        let expected = [0, 1, 2, 3].map(|layer| {
-            // Two layers of particles in a layer of cells.
-            let at = |y: f64| (1.0 + rate * step * (1.0 - y / 0.4).powi(2)).powi(-frames);
-            let y = 0.1 * f64::from(layer);
-            0.5 * 0.5 * (at(y + 0.025) + at(y + 0.075))
-        });
+        let expected = left_of_layers().map(|left| 0.5 * left);
         let states = [
-            on_gpu(&context, &scene, &particles, frames as u32),
-            on_cpu(&scene, &particles, frames as u32),
+            on_gpu(&context, &scene, &particles, FRAMES),
+            on_cpu(&scene, &particles, FRAMES),
         ];
         for state in &states {
             let found = layers(state, 0);
@@ -111,11 +122,11 @@ fn a_flow_dies_out_as_the_zone_says() {
         }
         // Negative control: half the period, twice the rate.
         scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 4.0);
-        let other = layers(&on_gpu(&context, &scene, &particles, frames as u32), 0);
+        let other = layers(&on_gpu(&context, &scene, &particles, FRAMES), 0);
         assert!((other[0] - expected[0]).abs() > 0.05, "{other:?}");
         // Without the zone the velocity stays.
         scene.effects.absorbing_zone = None;
-        let plain = layers(&on_gpu(&context, &scene, &particles, frames as u32), 0);
+        let plain = layers(&on_gpu(&context, &scene, &particles, FRAMES), 0);
         assert!(plain.iter().all(|v| (v - 0.5).abs() < 1e-5), "{plain:?}");
     }
 }
@@ -127,28 +138,17 @@ fn a_flow_dies_out_as_the_zone_says() {
 fn a_zone_leads_water_to_the_current() {
     let context = context();
     for method in METHODS {
-        let (mut scene, mut particles) = half_full(method);
-        scene.periodic = [true, false, true];
-        scene.water.gravity = DVec3::ZERO;
-        of_flip::flip(&mut scene).pic_blend = 0.0;
-        scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 8.0);
+        let (mut scene, mut particles) = zone_on_the_floor(method);
         let current = DVec3::new(0.5, 0.0, -0.3);
         scene.water.current = current;
-        let (frames, step) = (25, 0.02f64);
-        let rate = 5.0 * std::f64::consts::PI / 8.0;
-        let left = |y: f64| (1.0 + rate * step * (1.0 - y / 0.4).powi(2)).powi(-frames);
         let apart = |state: &Particles, axis: usize| -> f64 {
-            let found = layers(state, axis).into_iter().enumerate();
-            let gaps = found.map(|(layer, found)| {
-                let y = 0.1 * layer as f64;
-                let mean = 0.5 * (left(y + 0.025) + left(y + 0.075));
-                (found - current[axis] * (1.0 - mean)).abs()
-            });
+            let both = layers(state, axis).into_iter().zip(left_of_layers());
+            let gaps = both.map(|(found, left)| (found - current[axis] * (1.0 - left)).abs());
             gaps.fold(0.0, f64::max)
         };
         for state in [
-            on_gpu(&context, &scene, &particles, frames as u32),
-            on_cpu(&scene, &particles, frames as u32),
+            on_gpu(&context, &scene, &particles, FRAMES),
+            on_cpu(&scene, &particles, FRAMES),
         ] {
             for axis in [0, 2] {
                 let found = apart(&state, axis);
@@ -158,7 +158,7 @@ fn a_zone_leads_water_to_the_current() {
         }
         particles.velocity.fill(current.as_vec3().to_array());
         let off = |scene: &Scene| -> f64 {
-            let state = on_gpu(&context, scene, &particles, frames as u32);
+            let state = on_gpu(&context, scene, &particles, FRAMES);
             let velocity = state.velocity.iter();
             let off = velocity.map(|v| DVec3::from_array(v.map(f64::from)) - current);
             off.map(DVec3::length).fold(0.0, f64::max)
