@@ -54,8 +54,8 @@ pub(super) fn check(
         let left = zone.left(through);
         if left > MOST_LEFT {
             let problem = format!(
-                "a current of {} m/s carries {:.0} % of a disturbance through a zone of {} m, and at \
-                 most {:.0} % may pass; make the zone longer or the period shorter",
+                "a current of {} m/s carries {:.0} % of a disturbance through a zone of {} m, and \
+                 at most {:.0} % may pass; make the zone longer or the period shorter",
                 shown(through),
                 100.0 * left,
                 shown(zone.length),
