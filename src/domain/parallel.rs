@@ -5,6 +5,7 @@
 //! the compiler's time. Results stand in the order of the indices, whatever the number of threads.
 
 use std::{
+    mem,
     ops::Range,
     sync::{Mutex, PoisonError},
 };
@@ -65,22 +66,22 @@ pub fn for_chunks_mut<T: Send>(
 fn gather<T: Send>(range: Range<usize>, of: &(dyn Fn(Range<usize>) -> Vec<T> + Sync)) -> Vec<T> {
     let length = piece_length(range.len());
     let pieces = range.len().div_ceil(length);
-    let done: Vec<Mutex<Vec<T>>> = (0..pieces).map(|_| Mutex::default()).collect();
+    let mut parts = Vec::new();
+    parts.resize_with(pieces, Vec::new);
+    let parts = Mutex::new(parts);
     run(pieces, &|piece| {
         let first = range.start + piece * length;
         let part = of(first..range.end.min(first + length));
-        *done[piece].lock().unwrap_or_else(PoisonError::into_inner) = part;
+        parts.lock().unwrap_or_else(PoisonError::into_inner)[piece] = part;
     });
-    let parts = done
-        .into_iter()
-        .map(|part| part.into_inner().unwrap_or_else(PoisonError::into_inner));
-    let mut parts: Vec<Vec<T>> = parts.collect();
-    if parts.len() == 1 {
-        return parts.swap_remove(0);
-    }
-    let mut all = Vec::with_capacity(parts.iter().map(Vec::len).sum());
-    for mut part in parts {
-        all.append(&mut part);
+    let mut parts = parts.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let [first, rest @ ..] = &mut parts[..] else {
+        return Vec::new();
+    };
+    let mut all = mem::take(first);
+    all.reserve_exact(rest.iter().map(Vec::len).sum());
+    for part in rest {
+        all.append(&mut mem::take(part));
     }
     all
 }
