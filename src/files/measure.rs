@@ -30,6 +30,8 @@ pub enum Measure {
     Slide,
     /// A body in water: the first of the scene, with the elevation probes where it floats.
     Body,
+    /// Waves behind a body in a current along x, whose path is the domain's least z.
+    ShipWaves,
 }
 
 /// Number of solitary waves.
@@ -43,7 +45,7 @@ const SEAWARD: &str = "distance from the shoreline of still water towards the se
 
 impl Measure {
     /// All measures with the names used in studies.
-    pub(super) const NAMED: [(&'static str, Self); 13] = [
+    pub(super) const NAMED: [(&'static str, Self); 14] = [
         ("regular_waves", Self::RegularWaves),
         ("waves_by_theory", Self::WavesByTheory),
         ("solitary_wave", Self::SolitaryWave),
@@ -57,6 +59,7 @@ impl Measure {
         ("taylor_green", Self::TaylorGreen),
         ("slide", Self::Slide),
         ("body", Self::Body),
+        ("ship_waves", Self::ShipWaves),
     ];
 
     /// Returns the names of the inputs that it needs.
@@ -75,6 +78,7 @@ impl Measure {
             Self::TaylorGreen => &["length", "speed"],
             Self::Slide => &["length", "height"],
             Self::Body => &["after"],
+            Self::ShipWaves => &["depth", "length", "speed", "after"],
         }
     }
 
@@ -255,6 +259,17 @@ impl Measure {
                     "momentum of water and bodies, most that it is off that of the start, of it",
                 ),
             ],
+            Self::ShipWaves => &[
+                (
+                    "length_ratio",
+                    "length of the waves in deep water over 2πU²/g",
+                ),
+                ("half_angle", "half-angle of their wedge, degrees"),
+                (
+                    "misfit",
+                    "elevation that is no stationary wave, root mean square over that of all",
+                ),
+            ],
         }
     }
 
@@ -319,6 +334,14 @@ impl Measure {
                 ),
                 ("roll", ["roll about z", "time, s", "rad, from the mean"]),
             ],
+            Self::ShipWaves => &[(
+                "elevation",
+                [
+                    "elevation half a wave length beside the body's path",
+                    "distance behind the body, wave lengths",
+                    "η, m",
+                ],
+            )],
         }
     }
 }

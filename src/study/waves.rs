@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
+use crate::least_squares::least_squares;
+
 /// One harmonic of a signal, a + c cos(ωt) + s sin(ωt) = a + A cos(ωt − φ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
@@ -23,43 +25,13 @@ pub fn harmonic(samples: &[(f64, f64)], omega: f64) -> Option<Harmonic> {
     if samples.len() < 4 {
         return None;
     }
-    let mut normal = [[0.0; 4]; 3];
-    for &(t, value) in samples {
-        let row = [1.0, (omega * t).cos(), (omega * t).sin()];
-        for (i, line) in normal.iter_mut().enumerate() {
-            for (sum, other) in line.iter_mut().zip(row.into_iter().chain([value])) {
-                *sum += row[i] * other;
-            }
-        }
-    }
-    let [mean, cos, sin] = solved(normal)?;
+    let row = |&(t, value): &(f64, f64)| [1.0, (omega * t).cos(), (omega * t).sin(), value];
+    let [mean, cos, sin] = least_squares(samples.iter().map(row), 0.0)?;
     Some(Harmonic {
         mean,
         amplitude: cos.hypot(sin),
         phase: sin.atan2(cos),
     })
-}
-
-/// Solves three linear equations, right-hand sides last, by Gaussian elimination with pivoting;
-/// `None` if they are singular.
-fn solved(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
-    let scale = rows.iter().flatten().fold(0.0f64, |a, v| a.max(v.abs()));
-    for k in 0..3 {
-        let pivot = (k..3).max_by(|&a, &b| rows[a][k].abs().total_cmp(&rows[b][k].abs()))?;
-        rows.swap(k, pivot);
-        let row = rows[k];
-        // Also false for NaN.
-        if row[k].abs().partial_cmp(&(1e-9 * scale)) != Some(std::cmp::Ordering::Greater) {
-            return None;
-        }
-        for other in (0..3).filter(|&other| other != k) {
-            let factor = rows[other][k] / row[k];
-            for column in 0..4 {
-                rows[other][column] -= factor * row[column];
-            }
-        }
-    }
-    Some([0, 1, 2].map(|k| rows[k][3] / rows[k][k]))
 }
 
 /// Samples of the last whole periods that begin after `after`, seconds.
@@ -131,17 +103,11 @@ pub fn crest(samples: &[(f64, f64)], part: f64) -> Option<(f64, f64)> {
     }
     let from = samples[middle].0;
     let width = (high[high.len() - 1].0 - high[0].0).max(f64::MIN_POSITIVE);
-    let mut normal = [[0.0; 4]; 3];
-    for &(t, value) in high {
+    let row = |&(t, value): &(f64, f64)| {
         let x = (t - from) / width;
-        let row = [1.0, x, x * x];
-        for (i, line) in normal.iter_mut().enumerate() {
-            for (sum, other) in line.iter_mut().zip(row.into_iter().chain([value])) {
-                *sum += row[i] * other;
-            }
-        }
-    }
-    let [level, slope, bend] = solved(normal)?;
+        [1.0, x, x * x, value]
+    };
+    let [level, slope, bend] = least_squares(high.iter().map(row), 0.0)?;
     let x = -0.5 * slope / bend;
     (bend < 0.0 && x.abs() <= 1.0).then_some((from + x * width, level + 0.5 * slope * x))
 }

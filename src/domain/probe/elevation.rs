@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::SUPPORT;
-use crate::{bounds::Bounds, particles::Particles, surface::calm_radius};
+use crate::{bounds::Bounds, parallel, particles::Particles, surface::calm_radius};
 
 /// Samples along a column per particle spacing.
 const SAMPLES: f64 = 8.0;
@@ -22,8 +22,44 @@ const BRIDGED: f64 = SUPPORT;
 /// within a body that is stretched or stirred. Columns are sampled at an eighth of a spacing; where
 /// φ changes its sign between two samples, it is interpolated linearly.
 pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2) -> Option<f64> {
+    let near = column(particles.position.iter(), domain, SUPPORT * spacing, at);
+    top(&near, spacing, domain, at)
+}
+
+/// Returns the [`elevation`] over each of many places, from one look at all particles.
+pub fn elevations(
+    particles: &Particles,
+    spacing: f64,
+    domain: &Bounds,
+    at: &[DVec2],
+) -> Vec<Option<f64>> {
     let support = SUPPORT * spacing;
-    let near = column(particles, domain, support, at);
+    let position = &particles.position;
+    let mut by_x: Vec<(f64, usize)> = (position.iter().enumerate())
+        .map(|(k, p)| (f64::from(p[0]), k))
+        .collect();
+    by_x.sort_by(|a, b| a.0.total_cmp(&b.0));
+    parallel::map(0..at.len(), |k| {
+        let x = at[k].x;
+        let images = [x, 2.0 * domain.min.x - x, 2.0 * domain.max.x - x];
+        let within = |x: f64| {
+            let first = by_x.partition_point(|p| p.0 < x - support);
+            let end = by_x.partition_point(|p| p.0 <= x + support);
+            by_x[first..end].iter().map(|p| p.1)
+        };
+        let mut near: Vec<usize> = images.into_iter().flat_map(within).collect();
+        near.sort_unstable();
+        near.dedup();
+        let near = near.iter().map(|&k| &position[k]);
+        let near = column(near, domain, support, at[k]);
+        top(&near, spacing, domain, at[k])
+    })
+}
+
+/// Top of the thickest stretch of water in a column; `near` are the particles around it, in
+/// ascending order.
+fn top(near: &[DVec3], spacing: f64, domain: &Bounds, at: DVec2) -> Option<f64> {
+    let support = SUPPORT * spacing;
     let (low, high) = (domain.min.y, near.last()?.y + support);
     let radius = calm_radius(SUPPORT) * spacing;
     let step = spacing / SAMPLES;
@@ -77,11 +113,16 @@ pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2
 }
 
 /// Particles and their mirror images around the column over `at`, in ascending order.
-fn column(particles: &Particles, domain: &Bounds, support: f64, at: DVec2) -> Vec<DVec3> {
+fn column<'a>(
+    position: impl Iterator<Item = &'a [f32; 3]>,
+    domain: &Bounds,
+    support: f64,
+    at: DVec2,
+) -> Vec<DVec3> {
     let (min, max) = (domain.min, domain.max);
     let images = |x: f64, axis: usize| [x, 2.0 * min[axis] - x, 2.0 * max[axis] - x];
     let mut near = Vec::new();
-    for p in &particles.position {
+    for p in position {
         let p = Vec3::from_array(*p).as_dvec3();
         let is_near = |x: &f64| (x - at.x).abs() < support;
         for x in images(p.x, 0).into_iter().filter(is_near) {
@@ -122,6 +163,14 @@ mod tests {
             }
             assert!((mean - 0.9).abs() < 0.002, "{mean}");
         }
+        // One look at all particles finds the same, beside walls too.
+        let particles = block([12, 9, 12], DVec3::ZERO);
+        let at: Vec<DVec2> = (0..16)
+            .map(|k| DVec2::new(0.08 * f64::from(k), 0.003 + 0.08 * f64::from((5 * k) % 16)))
+            .collect();
+        let one_by_one: Vec<_> = at.iter().map(|at| height(&particles, *at)).collect();
+        assert!(one_by_one.iter().flatten().count() > 10);
+        assert_eq!(elevations(&particles, 0.1, &domain(), &at), one_by_one);
         // Negative control: a layer less is a spacing less.
         let lower = height(&block([12, 8, 12], DVec3::ZERO), DVec2::splat(0.6)).unwrap();
         assert!((lower - 0.8).abs() < 0.005, "{lower}");

@@ -15,7 +15,7 @@ use glam::{DVec3, Vec3};
 
 use super::particles::Particles;
 
-pub use elevation::elevation;
+pub use elevation::{elevation, elevations};
 pub use fitted::fitted;
 pub use flux::flux;
 pub use force::{Patch, load, patches};

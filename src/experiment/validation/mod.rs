@@ -6,6 +6,7 @@ mod body;
 mod numbers;
 mod record;
 mod report;
+mod ship_waves;
 mod start;
 mod verdict;
 

@@ -12,6 +12,7 @@ use swell_study::waves;
 use super::{
     BenchmarkMeasurements, beach, body,
     record::{FrameRecord, Record},
+    ship_waves,
 };
 
 /// Gravity of the published numbers, m/s², regardless of the scene.
@@ -56,6 +57,7 @@ pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
         Measure::TaylorGreen => taylor_green(record, &mut out),
         Measure::Slide => slide(record, &mut out),
         Measure::Body => body::of(record, &mut out),
+        Measure::ShipWaves => ship_waves::of(record, &mut out),
     }
     out.numbers.retain(|_, value| value.is_finite());
     for curve in out.curves.values_mut() {

@@ -12,7 +12,7 @@ use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
 use swell_stage::drive::ComputedFrame;
 
-use super::beach;
+use super::{beach, ship_waves};
 
 /// Fraction of the water behind the front, so that single particles running ahead do not count.
 const FRONT: f64 = 0.995;
@@ -151,6 +151,9 @@ impl<'a> Record<'a> {
                 vec![seen.map(|(_, v)| speed(v)).fold(0.0, f64::max)]
             }
             Measure::SolitaryBeach => beach::profile(self, time, particles),
+            Measure::ShipWaves if self.rows.len().is_multiple_of(self.every()) => {
+                ship_waves::elevations(self, time, particles)
+            }
             // Position of the front.
             Measure::DamBreak => {
                 let spacing = self.scene.particle_spacing();

@@ -98,8 +98,8 @@ impl Trial {
 pub struct Scale {
     /// Depth of still water, metres.
     pub depth: f64,
-    /// Length of a column, a wave or a box, or distance of a dam, or of the shoreline on a beach,
-    /// from the domain's least x, metres.
+    /// Length of a column, a wave or a box, or distance of a dam, of a body in a current, or of the
+    /// shoreline on a beach, from the domain's least x, metres.
     pub length: f64,
     /// Height of a crest above still water, metres.
     pub height: f64,
@@ -107,7 +107,7 @@ pub struct Scale {
     pub stroke: f64,
     /// Period of a piston, seconds.
     pub period: f64,
-    /// Speed of a vortex or a jet, m/s.
+    /// Speed of a vortex, a jet or a current, m/s.
     pub speed: f64,
     /// Initial seconds of the shot that are ignored.
     pub after: f64,
