@@ -165,11 +165,20 @@ fn regular_waves_of_the_start_run_through_a_periodic_tank() {
     }
 }
 
-/// Mean celerity of a wave 1 m long and 2 cm high with FLIP, relative to a current of `speed` m/s
-/// and over that of linear theory, to which third order adds 0.2 %.
-fn celerity_in_current(cells: u32, speed: f64) -> f64 {
+/// A wave 1 m long and 2 cm high with FLIP.
+struct Wave {
+    /// Mean celerity relative to the current over that of linear theory, to which third order adds
+    /// 0.2 %.
+    celerity: f64,
+    /// Height that a period leaves: mean of one over that of the one before, the second.
+    height_left: f64,
+}
+
+fn wave_in_current(cells: u32, speed: f64, transfer: &str) -> Wave {
     const LENGTH: f64 = 1.0;
     const FRAMES: u32 = 48;
+    // A little more than a period of 0.80 s.
+    const PERIOD: usize = 19;
     let (cell, number) = (LENGTH / f64::from(cells), TAU / LENGTH);
     let frequency = (GRAVITY * number * (number * 0.5).tanh()).sqrt();
     let text = format!(
@@ -177,21 +186,62 @@ fn celerity_in_current(cells: u32, speed: f64) -> f64 {
          min = [0, 0, 0]\nmax = [2, {}, {}]\nperiodic = [\"x\", \"z\"]\n[water]\n\
          current = [{speed}, 0, 0]\n[[water.wave]]\nkind = \"stokes\"\nheight = 0.02\n\
          period = {}\ndepth = 0.5\n[solver]\nmethod = \"flip\"\n[solver.flip]\n\
-         cell_size = {cell}\n",
+         cell_size = {cell}\ntransfer = \"{transfer}\"\n",
         0.5 + 4.0 * cell,
         8.0 * cell,
         TAU / frequency
     );
     let job = Job::of(&[("wave.toml", &text)]);
     job.expect(0, "bake wave.toml -o wave");
-    let phase = |frame: u32| harmonic(&distances(&job, "wave", frame), number, 2.0 * LENGTH).1;
+    let waves: Vec<(f64, f64)> = (0..=FRAMES)
+        .map(|frame| harmonic(&distances(&job, "wave", frame), number, 2.0 * LENGTH))
+        .collect();
     // Less than half a turn from frame to frame.
-    let turned = (1..=FRAMES).map(|frame| {
-        let by = phase(frame) - phase(frame - 1);
+    let turned = waves.windows(2).map(|pair| {
+        let by = pair[1].1 - pair[0].1;
         (by + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU
     });
     let turned: f64 = turned.sum();
-    (turned * 24.0 / f64::from(FRAMES) - number * speed) / frequency
+    let (rest, last) = waves.split_at(waves.len() - PERIOD);
+    let sum = |waves: &[(f64, f64)]| waves.iter().map(|wave| wave.0).sum::<f64>();
+    Wave {
+        celerity: (turned * 24.0 / f64::from(FRAMES) - number * speed) / frequency,
+        height_left: sum(last) / sum(&rest[rest.len() - PERIOD..]),
+    }
+}
+
+/// Waves of few cells are slow, because interpolation between particles and grid smooths their
+/// velocities, and the surface is a mean over cells; with APIC's affine rows less so, and they keep
+/// their height. Control: at 12 cells both are off by more than at 16 and 24.
+#[test]
+fn waves_of_few_cells_are_slow_within_limits() {
+    let found = ["flip", "apic"].map(|transfer| {
+        [12, 16, 24].map(|cells| {
+            let wave = wave_in_current(cells, 0.0, transfer);
+            let Wave {
+                celerity,
+                height_left,
+            } = wave;
+            println!(
+                "{transfer}, {cells} cells a wave: celerity {celerity:.4} of theory's, \
+                 {height_left:.3} of the height after a period"
+            );
+            wave
+        })
+    });
+    let [flip, apic] = found;
+    for of_transfer in [&flip, &apic] {
+        let off = of_transfer
+            .each_ref()
+            .map(|wave| (1.0 - wave.celerity).abs());
+        assert!(off[0] > 1.5 * off[1] && off[1] > 1.5 * off[2], "{off:?}");
+    }
+    assert!((0.92..0.94).contains(&flip[0].celerity));
+    assert!((0.955..0.975).contains(&apic[0].celerity));
+    for (flip, apic) in flip.iter().zip(&apic) {
+        assert!((1.0 - apic.celerity).abs() < 0.6 * (1.0 - flip.celerity).abs());
+        assert!(1.0 - apic.height_left < 0.5 * (1.0 - flip.height_left));
+    }
 }
 
 /// A current carries waves along and does not change them (Galilean invariance): at their own
@@ -202,7 +252,7 @@ fn celerity_in_current(cells: u32, speed: f64) -> f64 {
 #[test]
 fn waves_in_a_current_have_their_celerity() {
     let found = [(24, 0.0), (24, -1.25), (12, 0.0), (12, -1.25)].map(|(cells, speed)| {
-        let found = celerity_in_current(cells, speed);
+        let found = wave_in_current(cells, speed, "flip").celerity;
         println!("{cells} cells a wave, {speed} m/s: {found:.4} of theory's celerity");
         found
     });
